@@ -25,7 +25,7 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
     assert lines(paper(cycle__period_us=500)) == {
         "used": "270 us of the 250 that the bus may use, 108 %, 6.62 of it bias of the model",
         "short by": "20 us, +/- 6",
-        "fastest period": "553 us",
+        "fastest period": "553 us as set; 433 us with bus.gap_count = 7",
         "cure": "bus.gap_count = 7, which leaves 46 us",
         "largest part": "execution, 147 us",
         "largest doubt": "execution time, 54 % of the variance",

@@ -13,6 +13,7 @@ from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import period
+from busplan.profile.edit import short_text
 from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.figures import (
@@ -25,7 +26,17 @@ from busplan.questions.fit.figures import (
 )
 from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.network import changed
-from busplan.questions.plan.search import NODES, Changes, SmallestPeriod, cure, missed_limits, smallest_period
+from busplan.questions.plan.search import (
+    NODES,
+    Changes,
+    SettingForPeriod,
+    SmallestPeriod,
+    best_register,
+    cure,
+    cure_by_setting,
+    missed_limits,
+    smallest_period,
+)
 from busplan.sections.base import MAX_COUNT
 
 
@@ -59,6 +70,8 @@ class Verdict:
     """Keys of [limits] that the network does not keep, each with the reason."""
     fastest: SmallestPeriod | None
     """The shortest period with the verdict "fits"; None for a network without a cycle."""
+    best_register: SettingForPeriod | None
+    """The setting of a register that makes this period the shortest; None if none does."""
     after_reset: FitFigures | None
     """Figures after a bus reset; None unless the cycle is shown to fit now and not after the reset."""
     assumptions: tuple[HeavyAssumption, ...]
@@ -76,6 +89,8 @@ class Verdict:
     or if no change is enough."""
     no_change: str
     """Why there is no change, if one was looked for."""
+    setting: Change | None = None
+    """A setting of the bus that mends what is wrong, too, where `change` is a longer period."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -112,6 +127,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
     ratio = float(plain(network.slice_ratio))
     missed = {need.key: need.words(ratio=ratio, most_us=period_us) for need in missed_limits(network)}
     change, no_change = _change(network, deciding, is_missed=bool(missed))
+    fastest = smallest_period(network, is_safe=False, with_limits=False) if network.groups else None
     return Verdict(
         network=network,
         period_us=period_us,
@@ -119,7 +135,8 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         others=tuple(result for result in results if result is not deciding),
         broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
         missed_limits=tuple(missed.items()),
-        fastest=smallest_period(network, is_safe=False, with_limits=False) if network.groups else None,
+        fastest=fastest,
+        best_register=None if fastest is None else best_register(network, fastest),
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
         left_out=cycle.left_out(),
@@ -128,6 +145,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,
         no_change=no_change,
+        setting=None if change is None else _setting(network, deciding, change),
     )
 
 
@@ -149,6 +167,15 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
         return None, mending.why
     after = figures(changed(target, mending.changes), model=now.timing_model)
     return Change(mending.changes, int(plain(target.nodes)), after), ""
+
+
+def _setting(network: Network, now: CapacityFigures, change: Change) -> Change | None:
+    """A setting of the bus that mends a network, where the change is a longer period."""
+    target = changed(network, {NODES: change.nodes}) if change.nodes != int(plain(network.nodes)) else network
+    values = cure_by_setting(target, instead_of=change.changes)
+    if values is None:
+        return None
+    return Change(values, change.nodes, figures(changed(target, values), model=now.timing_model))
 
 
 _DIGITS: Final = 3
@@ -243,16 +270,25 @@ def _times(verdict: Verdict) -> Iterator[_Line]:
 
 
 def _fastest(verdict: Verdict) -> Sentence:
-    fastest, uncertainty_us = verdict.fastest, verdict.deciding.uncertainty_us
+    fastest, best = verdict.fastest, verdict.best_register
+    with_best = ""
+    if best is not None:
+        values = " and ".join(f"{key} = {short_text(value)}" for key, value in best.changes.items())
+        with_best = f"; {_rounded_up(verdict, best.period_us)} with {values}"
     if fastest is None or fastest.us is None:
-        return Sentence((f"none: {fastest.need.why if fastest else ''}",), "fails")
+        why = fastest.need.why if fastest else ""
+        return Sentence((f"none as set{with_best}" if best else f"none: {why}",), "fails")
     limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
-    period_us = fastest.us
+    as_set = " as set" if best else ""
+    return Sentence((f"{_rounded_up(verdict, fastest.us)}{as_set}{limited}{with_best}",))
+
+
+def _rounded_up(verdict: Verdict, us: float) -> str:
+    """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not verdict.network.bus.periods.us:
-        # Rounded up to the digits that its uncertainty allows; a period from the bus's list stays as it is.
-        scale = 10.0 ** _decimals(period_us, uncertainty_us)
-        period_us = ceil(period_us * scale * (1 - FIT_ROUNDING)) / scale
-    return Sentence((f"{period(period_us)}{limited}",))
+        scale = 10.0 ** _decimals(us, verdict.deciding.uncertainty_us)
+        us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
+    return period(us)
 
 
 def _room(verdict: Verdict) -> Iterator[_Line]:
@@ -274,11 +310,13 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
         if verdict.no_change:
             yield label, Sentence((f"none: {verdict.no_change}",))
         return
-    meanings = change_meanings(verdict.network.bus)
-    settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
-    left_us = change.figures.margin_corrected_us
-    left = "" if left_us is None else f", which leaves {_us(left_us, change.figures.uncertainty_us)} us"
-    yield label, joined(settings, Sentence((left,)), by="")
+    # The cheaper for the machine first.
+    for name, one in zip((label, "or"), filter(None, (verdict.setting, change)), strict=False):
+        meanings = change_meanings(verdict.network.bus)
+        settings = settings_sentence(one.changes, meanings=meanings, quotes=False)
+        left_us = one.figures.margin_corrected_us
+        left = "" if left_us is None else f", which leaves {_us(left_us, one.figures.uncertainty_us)} us"
+        yield name, joined(settings, Sentence((left,)), by="")
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:

@@ -205,6 +205,39 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
     return SmallestPeriod(None, need._replace(why=why))
 
 
+class SettingForPeriod(NamedTuple):
+    """A setting that only a number in the nodes has to change for, and the smallest period with it."""
+
+    changes: "Changes"
+    """New value by dotted key."""
+    period_us: float
+
+
+_WORTHWHILE: Final = 0.99
+"""Share of the smallest period from which on a shorter one is not worth a word."""
+
+
+def best_register(network: Network, now: SmallestPeriod) -> SettingForPeriod | None:
+    """Find the setting of a register with which the smallest period is the shortest; None if none is worthwhile.
+
+    Parameters
+    ----------
+    network
+        The network; its own period plays no part.
+    now
+        Its smallest period as it is set.
+    """
+    settings = [setting for setting in network.bus.settings(network) if setting.cost == Cost.REGISTER]
+    trials = [(values, _with_one(network, values)) for setting in settings for values in setting.values]
+    found = [
+        SettingForPeriod(values, least.us)
+        for values, trial in trials
+        if trial is not None and (least := smallest_period(trial, with_limits=False)).us is not None
+    ]
+    best = min(found, key=lambda trial: trial.period_us, default=None)
+    return best if best and best.period_us < _WORTHWHILE * (now.us or inf) else None
+
+
 def _allowed_us(network: Network, least_us: float) -> float:
     """The shortest period of at least a time that a bus allows; infinite where there is none [us]."""
     return float(plain(network.bus.periods.shortest_us(max(MIN_STEP_US, least_us))))
@@ -494,6 +527,23 @@ def cure(network: Network, *, kept: Collection[str] = ()) -> Cure:
     steps = search(network, freed(network, kept=kept), kept=kept)
     last = steps[-1]
     return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
+
+
+def cure_by_setting(network: Network, *, instead_of: Changes) -> Changes | None:
+    """The cheapest setting of the bus that alone mends a network, where its cure is a longer period; None if none does.
+
+    Parameters
+    ----------
+    network
+        The network.
+    instead_of
+        Its cure.
+    """
+    if PERIOD not in instead_of:
+        return None
+    settings = sorted(network.bus.settings(network), key=lambda setting: setting.cost)
+    trials = (values for setting in settings if setting.cost < Cost.PERIOD for values in setting.values)
+    return next((values for values in trials if _holds(network, values)), None)
 
 
 def stands_in_the_way(network: Network, step: PlanStep) -> Need:
