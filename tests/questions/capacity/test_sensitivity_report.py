@@ -26,12 +26,13 @@ def bars(profile: busplan.Profile) -> Any:
     return panel.plot
 
 
-def test_the_document_is_that_of_capacity_with_two_keys_more() -> None:
+def test_the_document_is_that_of_capacity_with_three_keys_more() -> None:
     plain = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0])
     answer = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0], sensitivity=True)
     whole = json.loads(answer.to_json())
     for verdict, sensitivity in zip(whole["verdicts"], answer.sensitivities, strict=True):
         rows, following = verdict.pop("sensitivity"), verdict.pop("next_bottleneck")
+        assert [reach["most"] for reach in verdict.pop("reach")] == [reach.most for reach in sensitivity.reaches]
         assert [row["margin_change_us"] for row in rows] == [effect.margin_change_us for effect in sensitivity.effects]
         assert [row["note"] for row in rows] == [effect.note or None for effect in sensitivity.effects]
         assert following["next_safe_nodes"] == sensitivity.next_bottleneck.limits[0].next_safe_nodes

@@ -237,6 +237,10 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
             Perturbation("one mailbox poll more", {"bus.mailbox_polls": bus.mailbox_polls + 1}),
             Perturbation(f"master +{_MASTER_STEP_US:g} us", {"bus.master_us": bus.master_us + _MASTER_STEP_US}),
             Perturbation(
+                f"master's jitter +{_MASTER_STEP_US:g} us",
+                {"bus.master_jitter_us": bus.master_jitter_us + _MASTER_STEP_US},
+            ),
+            Perturbation(
                 "outputs and inputs in bytes of their own",
                 {_PROCESS_DATA: SEPARATE},
                 why_not="" if layout(network) == SHARED else "they are already",

@@ -1,7 +1,9 @@
 """Sensitivity of the margin: the effect of each small change, and the next bottleneck after the first."""
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from itertools import chain
+from math import inf
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Term
@@ -9,8 +11,8 @@ from busplan.buses.limits import Perturbation
 from busplan.buses.network import Network
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import certainty
-from busplan.questions.fit.figures import FitFigures, figures, safe_nodes
+from busplan.questions.fit.certainty import FITS, TIME, certainty
+from busplan.questions.fit.figures import FitFigures, figures, limits_behind, safe_nodes
 from busplan.questions.fit.network import at_once, changed, trial, with_payloads
 from busplan.sections.base import TRANSACTION_KINDS, value_at
 from busplan.sections.machine import ProfileGroup
@@ -120,15 +122,19 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
         yield _with_keys(network, reset)
 
 
-def _slower(network: Network) -> Perturbed:
-    factor = 1 + _MORE_EXECUTION
+def slower(network: Network, factor: float) -> Network:
+    """The network with longer execution times."""
     groups = []
     for group in network.groups:
         read_us, write_us = factor * group.read_execution_us, factor * group.write_execution_us
         read_u_us, write_u_us = map(group.node.execution.standard_uncertainty_us, (read_us, write_us))
-        slower = group._replace(read_execution_us=read_us, write_execution_us=write_us)
-        groups.append(slower._replace(read_uncertainty_us=read_u_us, write_uncertainty_us=write_u_us))
-    slowed = network._replace(groups=tuple(groups))
+        longer = group._replace(read_execution_us=read_us, write_execution_us=write_us)
+        groups.append(longer._replace(read_uncertainty_us=read_u_us, write_uncertainty_us=write_u_us))
+    return network._replace(groups=tuple(groups))
+
+
+def _slower(network: Network) -> Perturbed:
+    slowed = slower(network, 1 + _MORE_EXECUTION)
     before, after = (
         _common_value(us for group in at.groups for us in (group.read_execution_us, group.write_execution_us))
         for at in (network, slowed)
@@ -210,6 +216,84 @@ class Effect(NamedTuple):
     """Why the change cannot be made; or why the margin stays as it is, and how much nearer other limits come."""
 
 
+class Reach(NamedTuple):
+    """How far one quantity may grow alone, until the plan is no longer shown to fit or the bus is unsafe."""
+
+    quantity: str
+    key: str
+    """Key of the profile; "execution" for the factor of all execution times."""
+    now: float
+    most: float
+    """The largest value that is shown to fit, to a thousandth; the largest that the profile takes, if none is too
+    large."""
+    limited_by: tuple[str, ...]
+    """What breaks beyond it: limits of the bus, time, or the setting that is unsafe; empty if nothing does."""
+
+
+_FINE: Final = 1e-3
+"""Relative step to which a value is found that has fractions."""
+_FARTHEST: Final = 1e6
+"""Largest factor of execution times that is tried."""
+
+
+def reaches(network: Network) -> Iterator[Reach]:
+    """How far execution times, payloads, nodes and each number of the bus may grow, one at a time.
+
+    Parameters
+    ----------
+    network
+        A network that is shown to fit.
+    """
+    bus = network.bus
+    if any(plain(group.read_execution_us) or plain(group.write_execution_us) for group in network.groups):
+        yield _reach("execution times, factor", "execution", 1.0, partial(slower, network))
+    for group in network.profile.node_groups:
+        nodes, limit = safe_nodes(network, group=group.name)
+        yield Reach(f"nodes{_in(group)}", group.nodes_key, int(group.nodes), nodes, (limit,))
+    for change in bus.perturbations(network):
+        ((key, after), *more) = change.changes.items()
+        now = value_at(network.profile, key)
+        if more or change.why_not or isinstance(after, bool | str) or not isinstance(now, int | float) or after <= now:
+            continue
+        reach = _reach(key, key, now, partial(_with_value, network, key))
+        if reach.limited_by or reach.most > now:  # some keys take a few values alone
+            yield reach
+
+
+def _with_value(network: Network, key: str, value: float) -> Network:
+    return changed(network, {key: value})
+
+
+def _reach(quantity: str, key: str, now: float, network_at: Callable[[float], Network]) -> Reach:
+    """Double the distance until something breaks, and halve what is in doubt."""
+    whole = isinstance(now, int)
+    kept, step, broken = float(now), 1.0 if whole else max(now, 1.0), inf
+    why: tuple[str, ...] = ()
+    while kept < _FARTHEST and broken == inf:
+        reasons = _broken_at(network_at, kept + step, whole=whole)
+        if reasons is None:
+            break
+        kept, broken, why = (kept + step, inf, ()) if not reasons else (kept, kept + step, reasons)
+        step *= 2
+    while broken < inf and broken - kept > (1 if whole else _FINE * broken):
+        middle = (kept + broken) // 2 if whole else (kept + broken) / 2
+        reasons = _broken_at(network_at, middle, whole=whole)
+        kept, broken, why = (middle, broken, why) if reasons == () else (kept, middle, reasons or why)
+    return Reach(quantity, key, now, int(kept) if whole else kept, why)
+
+
+def _broken_at(network_at: Callable[[float], Network], value: float, *, whole: bool) -> tuple[str, ...] | None:
+    """What breaks at a value; empty if nothing does, None if a profile cannot have it."""
+    try:
+        network = network_at(int(value) if whole else value)
+    except BusplanError:
+        return None
+    then = figures(network, model=network.bus.deciding_model)
+    if then.verdict == FITS:
+        return () if then.safe else (network.bus.safety.setting,)
+    return tuple(limit.key for limit in limits_behind(then, network)) or (TIME,)
+
+
 class Sensitivity(NamedTuple):
     """Effects of small changes on the margin at one period, by the timing model that decides."""
 
@@ -220,6 +304,8 @@ class Sensitivity(NamedTuple):
     effects: tuple[Effect, ...]
     """The largest first; changes that cannot be made come last."""
     next_bottleneck: NextBottleneck
+    reaches: tuple[Reach, ...]
+    """Empty for a network that is not shown to fit."""
 
 
 def sensitivity_of(network: Network) -> Sensitivity:
@@ -233,7 +319,9 @@ def sensitivity_of(network: Network) -> Sensitivity:
     now = figures(network, model=network.bus.deciding_model)
     effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
-    return Sensitivity(network, network.bus.deciding_model, now, tuple(effects), next_bottleneck(network))
+    is_well = now.verdict == FITS and now.safe
+    far = tuple(reaches(network)) if is_well else ()
+    return Sensitivity(network, network.bus.deciding_model, now, tuple(effects), next_bottleneck(network), far)
 
 
 def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:

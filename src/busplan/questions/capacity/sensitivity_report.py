@@ -1,7 +1,8 @@
 """Report of `busplan capacity --sensitivity`: the effect of each small change, and the next bottleneck."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
+from math import floor, log10
 from typing import Final
 
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
@@ -28,7 +29,7 @@ from busplan.forms.numbers import decimals_of, period_value, sentence_text
 from busplan.questions.base.sentences import fields, with_profile
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.report import capacity_report
-from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity
+from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Reach, Sensitivity
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, limits_behind
 
@@ -42,7 +43,12 @@ def sensitivity_report(answer: CapacityAnswer) -> Report:
     report, sensitivities = capacity_report(answer), answer.sensitivities
     effects = [[_record(effect, at.network) for effect in at.effects] for at in sensitivities]
     verdicts = [
-        {**verdict, "sensitivity": records, "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.network)}
+        {
+            **verdict,
+            "sensitivity": records,
+            "reach": [reach._asdict() for reach in at.reaches],
+            "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.network),
+        }
         for verdict, records, at in zip(report.document["verdicts"], effects, sensitivities, strict=True)
     ]
     rows = [
@@ -110,6 +116,8 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     yield _headline(sensitivity)
     yield from (Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note)
     yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.network)
+    if sensitivity.reaches:
+        yield _reaches_table(sensitivity.reaches)
 
 
 def _table(sensitivity: Sensitivity) -> Table:
@@ -139,6 +147,37 @@ def _table(sensitivity: Sensitivity) -> Table:
         for effect in sensitivity.effects
     )
     return Table(columns, tuple(rows), caption)
+
+
+def _reaches_table(reaches: Sequence[Reach]) -> Table:
+    """How far each quantity may grow."""
+    columns = (
+        TableColumn("what grows alone", kind="words"),
+        TableColumn("now"),
+        TableColumn("up to"),
+        TableColumn("then broken", kind="words"),
+    )
+    rows = (
+        TableRow(
+            (
+                reach.quantity,
+                ShownValue(reach.now, reach.key, digits=_CHANGE_DIGITS),
+                # Rounded down: no larger value is said to fit.
+                ShownValue(_rounded_down(reach.most), reach.key, digits=_CHANGE_DIGITS),
+                ", ".join(reach.limited_by) or "nothing",
+            )
+        )
+        for reach in reaches
+    )
+    return Table(columns, tuple(rows), Sentence(("How far until a limit breaks",)))
+
+
+def _rounded_down(value: float) -> float:
+    """A value in the digits that are shown, and no larger."""
+    if isinstance(value, int):
+        return value
+    step = 10.0 ** (floor(log10(value)) + 1 - (_CHANGE_DIGITS - 1)) if value else 1.0
+    return floor(value / step) * step
 
 
 def _step(effect: Effect) -> Cell:
