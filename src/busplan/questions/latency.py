@@ -273,8 +273,8 @@ def _by_transaction(
     figures.sort(key=lambda figure: figure.key not in (deadlines or ()))
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
     for table in answer.tables:
-        for model in dict.fromkeys(transaction.timing_model for transaction in table):
-            shares = [(row, _share(row, deadlines)) for row in table if row.timing_model == model]
+        for models, of_models in _by_models(table, figures):
+            shares = [(row, _share(row, deadlines)) for row in of_models]
             least = sorted((share for _, share in shares), reverse=True)[:_MOST_ROWS][-1]
             rows = (
                 TableRow(
@@ -283,7 +283,26 @@ def _by_transaction(
                 )
                 for transaction, share in shares
             )
-            yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {answer.subject}",)), heads=1)
+            yield Table(
+                columns,
+                tuple(rows),
+                Sentence((f"By the {' and the '.join(models)} model in us, {answer.subject}",)),
+                heads=1,
+            )
+
+
+def _by_models(
+    table: Sequence[Transaction], figures: Sequence[Figure]
+) -> Iterator[tuple[list[str], list[Transaction]]]:
+    """Transactions of each timing model; of models with the same figures those of the first, under the names of all."""
+    of_model: dict[str, list[Transaction]] = {}
+    for transaction in table:
+        of_model.setdefault(transaction.timing_model, []).append(transaction)
+    alike: dict[tuple[object, ...], list[str]] = {}
+    for model, rows in of_model.items():
+        shown = tuple((_name(row), *(row.phases[figure.key] for figure in figures)) for row in rows)
+        alike.setdefault(shown, []).append(model)
+    yield from ((models, of_model[models[0]]) for models in alike.values())
 
 
 def _name(transaction: Transaction) -> str:

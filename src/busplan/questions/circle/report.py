@@ -1,6 +1,7 @@
 """Answer of `busplan circle-test`: its verdict in sentences, tables and the drawing."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Final
 
 from busplan.english import listed
@@ -131,6 +132,7 @@ _HOST_ROWS: Final = ("update", "delay_us")
 ACT_TOGETHER: Final = Sentence(
     ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
 )
+_LEAST_FALL_MM: Final = 1e-6
 NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
 
 
@@ -151,6 +153,7 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
     simulated = (result for result in test.results if result.stable is not None)
     yield from _servo_sentence(test.profile, next(simulated, test.results[0]))
     yield _circle_table(test.results)
+    yield from _falling(test)
     if test.with_contributions:
         ranked = [result for result in test.results if result.contributions is not None]
         yield from (_contributions_table(result) for result in ranked if result.contributions)
@@ -160,6 +163,25 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
         # A cycle that does not fit has no circle; the verdict says why.
         if run is not None:
             yield _circle_chart(run, result, test.profile)
+
+
+def _falling(test: CircleTestAnswer) -> Iterator[Sentence]:
+    """Say why the largest error falls with a longer period, where it does."""
+    circles = [result for result in test.results if result.max_contour_error_mm is not None]
+    circles.sort(key=lambda result: result.period_us)
+    for before, after in pairwise(circles):
+        if (after.max_contour_error_mm or 0.0) < (before.max_contour_error_mm or 0.0) - _LEAST_FALL_MM:
+            chord_mm = after.feed_mm_per_min / 60e6 * after.period_us
+            inside_mm = chord_mm**2 / (8 * after.radius_mm)
+            yield sentence(
+                "The largest contour error falls from {} to {}: between set-points the path is a chord, up to {} "
+                "inside the circle, and the ramp has circle.ramp_periods periods, so it is gentler; both take from an "
+                "error outside the circle.",
+                period_value(before.period_us),
+                period_value(after.period_us),
+                ShownValue(inside_mm, "inside_mm", "um", 3),
+            )
+            return
 
 
 def _circle_table(results: Sequence[CircleFigures]) -> Table:

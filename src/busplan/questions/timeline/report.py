@@ -252,7 +252,10 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         spans, is_merged = _few_bars([list(draw(window, in_lane)) for in_lane in of_lane], window.from_us, window.to_us)
         if is_merged:
             legend = f"A bar is what takes most of a {_MOST_BARS}th of the scale."
-        labels = ["bus", *(f"node {n[0]}" if len(n) == 1 else f"nodes {n[0]} to {n[-1]}" for n in shared)]
+        names = _names_of_nodes(window)
+        ends = (list(dict.fromkeys((names[members[0] - 1], names[members[-1] - 1]))) for members in shared)
+        labels = ["bus", *(" to ".join(pair).replace("node ", "nodes ", len(pair) - 1) for pair in ends)]
+        labels = [label.replace(" to node ", " to ") for label in labels]
         lanes = [Lane(label, bars) for label, bars in zip(labels, spans, strict=True) if bars]
     if _overruns(window) and window.to_us > window.figures.available_us:
         lanes.append(_over(window))
@@ -266,6 +269,14 @@ def _plot(schedule: Schedule, end_us: float, lanes: Sequence[Lane], *, start_us:
     end = Entry("edge" if _overruns(schedule) else "limit", "end of the slice", shape="line")
     guides = (Guide(end, x=slice_us),) if start_us < slice_us < end_us else ()
     return Lanes(numbers("us", start_us, end_us), tuple(lanes), guides, **layout)
+
+
+def _names_of_nodes(window: Schedule) -> list[str]:
+    """Name of each node of the cycle: its number, or its group and its number in it."""
+    groups = window.network.profile.node_groups
+    names = [f"{group.name} {number}" for group in groups if group.name for number in range(1, int(group.nodes) + 1)]
+    nodes = int(window.figures.nodes)
+    return names if len(names) == nodes else [f"node {number}" for number in range(1, nodes + 1)]
 
 
 def _overruns(schedule: Schedule) -> bool:
