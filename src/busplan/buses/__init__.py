@@ -66,12 +66,28 @@ def kind_called(word: str, *, option: str = "") -> str:
     if word in _MODULES:
         return word
     buses = map(kind_named, kind_names())
-    kinds = {_plain(name): bus.kind for bus in buses for name in (bus.kind, bus.title, *bus.also_called)}
+    kinds = {
+        _plain(name): bus.kind
+        for bus in buses
+        for name in (bus.kind, bus.title, *bus.also_called, *bus.starter.variants)
+    }
     if _plain(word) in kinds:
         return kinds[_plain(word)]
     near = did_you_mean(_plain(word), kinds)
     argument = f"{option} {word}".strip()
     raise BusplanError(f"{argument}: no kind of bus; there are {', '.join(kind_names())}{near and f'; {near}'}")
+
+
+def variant_called(word: str) -> str:
+    """Name of the variant of a kind that a user's word means; empty for any other word.
+
+    Examples
+    --------
+    >>> variant_called("CAN FD"), variant_called("CAN")
+    ('can-fd', '')
+    """
+    names = (name for kind in kind_names() for name in kind_named(kind).starter.variants)
+    return next((name for name in names if _plain(name) == _plain(word)), "")
 
 
 def _plain(name: str) -> str:

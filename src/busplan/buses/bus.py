@@ -144,6 +144,10 @@ class Bus(ABC):
         """Functions by the name that a row of evidence has; each takes a cycle and the values of the row."""
         return {}
 
+    def title_of(self, network: Network) -> str:  # noqa: ARG002 - of every network the same, unless a kind has several
+        """Name of the bus of a network, for people."""
+        return self.title
+
     def recorded(
         self,
         network: Network,  # noqa: ARG002 - a kind may have none

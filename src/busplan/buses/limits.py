@@ -201,14 +201,20 @@ class Starter(NamedTuple):
     """Value of cycle.slice_ratio, with a comment."""
     measure: str = "measure it on a node"
     """Advice how to find execution times: a format with `file`, the profile, and `group`, an option of `calibrate`."""
+    node: str = ""
+    """Commented lines of a node, for what no default is right for."""
+    variants: Mapping[str, str] = {}
+    """Further lines of [bus] for another bus of the kind, by its name: "can-fd"."""
+    rate: str = ""
+    """Key of [bus] with a bit rate that a user is asked for; empty where there is one alone."""
     base: str = "what a node does in each cycle"
     """Meaning of execution.base_us."""
     more: str = ""
     """Commented lines at the end of the profile."""
 
-    def section(self, host: str | None = None) -> str:
-        """Section [bus] with the lines of a host, by default of `host`."""
-        return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host))))
+    def section(self, host: str | None = None, variant: str = "") -> str:
+        """Section [bus] with the lines of a host, by default of `host`, and of a variant."""
+        return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host), self.variants.get(variant))))
 
 
 class Cost(IntEnum):

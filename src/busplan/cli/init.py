@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
-from busplan.buses import kind_called, kind_named, kind_names
+from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.cli.options import complete_profile, option, time_us
 from busplan.cli.output import message_width, say
 from busplan.errors import BusplanError
@@ -21,6 +21,7 @@ _Answer = TypeVar("_Answer")
 _KIND = "ieee1394"
 _NODES = 4
 _AXES_PER_NODE = 4
+_BIT_RATE = 1000
 _BYTES_PER_AXIS = 8
 _GROUP: Final = re.compile(
     r"(?P<name>[\w-]{1,40}):(?P<nodes>\d{1,7})x(?P<axes>\d{1,7})(:(?P<read>\d{1,7})/(?P<write>\d{1,7}))?", re.ASCII
@@ -36,7 +37,7 @@ def init_command(
         str | None,
         option(
             "--bus KIND",
-            f"Kind of bus: {', '.join(kind_names())}, or another of its names, as firewire.  [default: {_KIND}]",
+            f"Kind of bus: {', '.join(kind_names())}, can-fd, or another name, as firewire.  [default: {_KIND}]",
             autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,
@@ -71,6 +72,9 @@ def init_command(
             "Kind of host, from which its own time is assumed; for EtherCAT hardware, tuned, real-time or stock.  "
             "[default: tuned]",
         ),
+    ] = None,
+    bit_rate: Annotated[
+        int | None, option("--bit-rate N", "Bit rate of CAN [kbit/s].  [default: 1000, assumed]", min=1)
     ] = None,
     source: Annotated[
         str | None,
@@ -107,13 +111,15 @@ def init_command(
         "--period": period,
         "--bytes-per-axis": bytes_per_axis,
         "--host": host,
+        "--bit-rate": bit_rate,
     }
     values = _Values({name: value for name, value in given.items() if value})
     from busplan.profile.starter import machine_text, starter_text
 
     if source is None:
-        kind = values.kind()
-        text = _with_settings(machine_text(_machine(kind, values), kind=kind, name=path.stem, file=shown), name=shown)
+        kind, variant = values.kind()
+        machine = _machine(kind, values)._replace(variant=variant)
+        text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
     else:
         if values.given:
             options = " and ".join(values.given)
@@ -194,12 +200,12 @@ class _Values:
             say("must be 1 or more")
         return number
 
-    def kind(self) -> str:
-        """Kind of bus; a word that is no kind is asked for again."""
+    def kind(self) -> tuple[str, str]:
+        """Kind of bus and its variant; a word that is no kind is asked for again."""
         while True:
             word = self.value("--bus", f"Kind of bus: {', '.join(kind_names())}", _KIND)
             try:
-                return kind_called(word, option="--bus" if "--bus" in self.given else "")
+                return kind_called(word, option="--bus" if "--bus" in self.given else ""), variant_called(word)
             except BusplanError as refused:
                 if "--bus" in self.given:
                     raise
@@ -242,7 +248,21 @@ def _machine(kind: str, values: _Values) -> "Machine":
     if host is not None and host not in starter.hosts:
         hosts = f"there are {', '.join(starter.hosts)}" if starter.hosts else f"a profile of kind {kind} has no host"
         raise BusplanError(f"--host {host}: {hosts}")
-    return Machine(groups, period_us, size, host)
+    return Machine(groups, period_us, size, host, rate=_rate(kind, values))
+
+
+def _rate(kind: str, values: _Values) -> int | None:
+    """The bit rate that is given or answered; None for the usual one, which is assumed."""
+    key, rate = kind_named(kind).starter.rate, values.given.get("--bit-rate")
+    if not key:
+        if rate is not None:
+            raise BusplanError(f"--bit-rate {rate}: a profile of kind {kind} says its rate elsewhere")
+        return None
+    if rate is None and values.asks:
+        return values.number("--bit-rate", "Bit rate, in kbit/s", _BIT_RATE)
+    if rate is None:
+        values.taken.append(f"--bit-rate {_BIT_RATE}")
+    return rate
 
 
 def _card(text: str) -> list[str]:

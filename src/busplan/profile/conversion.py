@@ -43,7 +43,7 @@ class Conversion(NamedTuple):
     """Keys and sections that the profile sets and the kind does not have."""
 
 
-def converted(profile: Profile, kind: str) -> Conversion:
+def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
     """Put the machine of a profile on a kind of bus; on its own kind it stays as it is.
 
     Its execution times are as long there, which is assumed.
@@ -54,6 +54,8 @@ def converted(profile: Profile, kind: str) -> Conversion:
         The profile.
     kind
         The kind of bus.
+    variant
+        Name of a variant of the kind; empty for the usual one.
 
     Raises
     ------
@@ -67,7 +69,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
     >>> conversion.profile.bus.kind, conversion.profile.bus.nodes, conversion.profile.node.axes
     ('can', 2, 4)
     """
-    if kind == profile.bus.kind:
+    if kind == profile.bus.kind and not variant:
         return Conversion(profile, (), ())
     data = profile.model_dump(exclude_unset=True)
     for table, group in zip(data.get("group", ()), profile.group, strict=True):
@@ -79,7 +81,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
     # The host keeps its share of the period, whatever each kind has by default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
     bus = kind_named(kind)
-    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section())
+    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section(variant=variant))
     cables_m = _cables_m(profile)
     if cables_m and cable_key:
         left_out = tuple(key for key in left_out if key not in cables_m)

@@ -72,7 +72,7 @@ _ALIKE: Final = f"""\
 {{payload}}
 [node]
 axes = {{axes}}
-
+{{more}}
 [node.execution]           # {{measure}}
 {_EXECUTION}"""
 _GROUP: Final = f"""\
@@ -80,7 +80,7 @@ _GROUP: Final = f"""\
 name = "{{name}}"
 nodes = {{nodes}}
 axes = {{axes}}
-{{payload}}
+{{more}}{{payload}}
 [group.execution]          # {{measure}}
 {_EXECUTION}"""
 
@@ -108,6 +108,10 @@ class Machine(NamedTuple):
     """Payload of each axis, in either direction; that of a node without axes and bytes of its own."""
     host: str | None = None
     """Name among the hosts of the kind; None for its usual one."""
+    variant: str = ""
+    """Name among the variants of the kind; empty for the usual one."""
+    rate: int | None = None
+    """Bit rate, in the unit of its key; None for the usual one, which is assumed."""
 
 
 def shared_out(axes: int, *, nodes: int) -> tuple[NodeGroup, ...]:
@@ -149,7 +153,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
-        bus=starter.section(machine.host),
+        bus=_bus(starter, machine),
         ratio=starter.slice_ratio,
         count="" if first.name else _COUNT.format(nodes=first.nodes),
         parts="\n".join(_part(group, machine=machine, starter=starter, file=file) for group in machine.groups),
@@ -158,6 +162,14 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
         more=starter.more and f"\n{starter.more}",
     )
     return _checked(text, name=name)
+
+
+def _bus(starter: Starter, machine: Machine) -> str:
+    """Section [bus]."""
+    section = starter.section(machine.host, machine.variant)
+    if machine.rate is None:
+        return section
+    return re.sub(rf"^{starter.rate} = .*$", f"{starter.rate} = {machine.rate}", section, flags=re.MULTILINE)
 
 
 def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) -> str:
@@ -170,6 +182,7 @@ def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) ->
         payload=_payload(group, bytes_per_axis=machine.bytes_per_axis),
         measure=starter.measure.format(file=file, group=of_group),
         base=starter.base,
+        more=starter.node,
     )
 
 

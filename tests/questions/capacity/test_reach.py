@@ -43,7 +43,7 @@ def test_what_it_names_fits_and_a_little_more_does_not(name: str) -> None:
         if not reach.limited_by:
             assert reach.most >= 1e6 or _is_refused(profile, reach)
             continue
-        beyond = reach.most + 1 if isinstance(reach.most, int) else reach.most * 1.002 + 1e-6
+        beyond = reach.most + 1 if isinstance(reach.most, int) else reach.most * 1.012 + 1e-6
         now = broken(grown(profile, reach, beyond))
         assert now, reach
         assert set(reach.limited_by) & now or now == {"unsafe"}, reach

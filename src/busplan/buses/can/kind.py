@@ -98,6 +98,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         slice_ratio="1            # assumed: the whole period is for communication",
         measure="measure both on a node: SYNC to its frame, command to effect",
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
+        variants={"can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000"},
+        rate="bit_rate_kbit_s",
         more="""\
 # What else goes over the bus? Without it the load is too small. For example of CANopen nodes, each on its own:
 # [[message]]
@@ -214,6 +216,10 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         from busplan.buses.can.evidence import FUNCTIONS  # a single command asks for them
 
         return FUNCTIONS
+
+    def title_of(self, network: Network) -> str:
+        """CAN, or CAN FD where it has a data bit rate."""
+        return self.title if network.profile.bus.data_bit_rate_kbit_s is None else f"{self.title} FD"
 
     def recorded(
         self, network: Network, path: "Path", *, share: float, channel: str | None, progress: Progress

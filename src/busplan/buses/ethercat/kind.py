@@ -171,7 +171,12 @@ class Ethercat(Bus):
 [bus]
 kind = "ethercat"
 # master = "SOEM"          # or IgH, ethercrab, TwinCAT, acontis; of an unknown one the most bytes are taken
-distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period""",
+distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
+# master_jitter_us = 20    # how late its frames may start: measure it under load; 0 is taken""",
+        node="""\
+# port = "E-bus"           # of terminals on a backplane; 100BASE-TX is taken
+# cable_m = 10             # from the device before it; 0 is taken
+""",
         hosts={
             "hardware": _host(5, "a master in hardware or a kernel driver of its own: a few us"),
             "tuned": _host(40, "a tuned Linux with its own driver: round trips less wire of 20 to 40 us"),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import chain
-from math import inf
+from math import floor, inf, log10
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Term
@@ -224,7 +224,7 @@ class Reach(NamedTuple):
     """Key of the profile; "execution" for the factor of all execution times."""
     now: float
     most: float
-    """The largest value that is shown to fit, to a thousandth; the largest that the profile takes, if none is too
+    """The largest value that is shown to fit, in three digits; the largest that the profile takes, if none is too
     large."""
     limited_by: tuple[str, ...]
     """What breaks beyond it: limits of the bus, time, or the setting that is unsafe; empty if nothing does."""
@@ -232,6 +232,7 @@ class Reach(NamedTuple):
 
 _FINE: Final = 1e-3
 """Relative step to which a value is found that has fractions."""
+_REACH_DIGITS: Final = 3
 _FARTHEST: Final = 1e6
 """Largest factor of execution times that is tried."""
 
@@ -279,7 +280,9 @@ def _reach(quantity: str, key: str, now: float, network_at: Callable[[float], Ne
         middle = (kept + broken) // 2 if whole else (kept + broken) / 2
         reasons = _broken_at(network_at, middle, whole=whole)
         kept, broken, why = (middle, broken, why) if reasons == () else (kept, middle, reasons or why)
-    return Reach(quantity, key, now, int(kept) if whole else kept, why)
+    # Rounded down: no larger value is said to fit.
+    step = 10.0 ** (floor(log10(kept)) - _REACH_DIGITS + 1) if kept else 1.0
+    return Reach(quantity, key, now, int(kept) if whole else round(floor(kept / step) * step, 9), why)
 
 
 def _broken_at(network_at: Callable[[float], Network], value: float, *, whole: bool) -> tuple[str, ...] | None:

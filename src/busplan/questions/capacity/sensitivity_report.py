@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
-from math import floor, log10
 from typing import Final
 
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
@@ -162,22 +161,13 @@ def _reaches_table(reaches: Sequence[Reach]) -> Table:
             (
                 reach.quantity,
                 ShownValue(reach.now, reach.key, digits=_CHANGE_DIGITS),
-                # Rounded down: no larger value is said to fit.
-                ShownValue(_rounded_down(reach.most), reach.key, digits=_CHANGE_DIGITS),
+                ShownValue(reach.most, reach.key, digits=_CHANGE_DIGITS),
                 ", ".join(reach.limited_by) or "nothing",
             )
         )
         for reach in reaches
     )
     return Table(columns, tuple(rows), Sentence(("How far until a limit breaks",)))
-
-
-def _rounded_down(value: float) -> float:
-    """A value in the digits that are shown, and no larger."""
-    if isinstance(value, int):
-        return value
-    step = 10.0 ** (floor(log10(value)) + 1 - (_CHANGE_DIGITS - 1)) if value else 1.0
-    return floor(value / step) * step
 
 
 def _step(effect: Effect) -> Cell:

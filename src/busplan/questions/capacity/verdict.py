@@ -199,7 +199,7 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
     counts = [plural(number, noun) for number, noun in bus.counted(network)]
     if network.groups:
         counts.append(period(verdict.period_us))
-    subject = Sentence((Code(network.profile.name), f"  {bus.title}, {', '.join(counts)}"))
+    subject = Sentence((Code(network.profile.name), f"  {bus.title_of(network)}, {', '.join(counts)}"))
     lines = [
         *_reasons(verdict),
         *(_times(verdict) if network.groups else ()),

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from math import ceil, floor, log2
 from typing import Final, NamedTuple
 
-from busplan.buses import kind_named, kind_names
+from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.buses.bus import Bus
 from busplan.buses.network import Network
+from busplan.elementwise import plain
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -19,7 +20,13 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
 from busplan.questions.fit.inputs import assumed_rates, given
 from busplan.questions.fit.network import at_period, changed, network_of, varied_nodes
-from busplan.questions.plan.search import SmallestPeriod, settings_to_be_carried, smallest_period
+from busplan.questions.plan.search import (
+    SettingForPeriod,
+    SmallestPeriod,
+    best_register,
+    settings_to_be_carried,
+    smallest_period,
+)
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
@@ -58,6 +65,8 @@ class MachineOnKind(NamedTuple):
     smallest: SmallestPeriod
     curve: tuple[SafeAxes, ...]
     """The most axes over the period."""
+    best: SettingForPeriod | None = None
+    """The setting, free to change, that makes `smallest` the smallest; the most axes are those with it or without."""
 
     @property
     def profile(self) -> Profile:
@@ -69,6 +78,11 @@ class MachineOnKind(NamedTuple):
     def bus(self) -> Bus:
         """The kind of bus."""
         return self.network.bus
+
+    @property
+    def title(self) -> str:
+        """Name of the bus, for people."""
+        return self.bus.title_of(self.network)
 
     @property
     def fits(self) -> bool:
@@ -90,6 +104,8 @@ class NotOnKind(NamedTuple):
     """A kind of bus that cannot have the machine."""
 
     bus: Bus
+    title: str
+    """Name of the bus, for people."""
     why: tuple[str, ...]
 
 
@@ -133,7 +149,7 @@ class CompareAnswer(Answer):
         KeyError
             The kind is not among those compared.
         """
-        return {machine.bus.kind: machine for machine in self.kinds}[kind]
+        return {variant_called(machine.title) or machine.bus.kind: machine for machine in self.kinds}[kind]
 
     def drawing(self) -> Drawing:
         """The most axes over the period, a curve for each kind of bus.
@@ -167,7 +183,7 @@ def compare(
     profile
         The profile: a `Profile`, a path or a shipped name. On its own kind it stays as it is.
     buses
-        Name of a kind of bus, or several; by default all, the profile's own first.
+        Name of a kind of bus or of a variant, as can-fd, or several; by default all, the profile's own first.
 
     Returns
     -------
@@ -189,36 +205,49 @@ def compare(
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
     network = network_of(require_cycle(load_profile(profile), question="compare"))
-    kinds = kind_names()
+    kinds = (*kind_names(), *(name for kind in kind_names() for name in kind_named(kind).starter.variants))
     names = (network.bus.kind, *kinds) if buses is None else [str(kind) for kind in one_or_several(buses, name="buses")]
     for name in names:
         if name not in kinds:
             near = did_you_mean(name, kinds)
             raise BusplanError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
-    machines = [_on_kind(network, name) for name in dict.fromkeys(names)]
+    machines = [_on_kind(network, name) for name in dict.fromkeys(names) if not _is_own_variant(network, name)]
     smallest_us = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
     periods_us = _curve_periods(network.profile.cycle.period_us, smallest_us)
     with_curves = (
         machine
         if isinstance(machine, NotOnKind)
-        else machine._replace(curve=tuple(_safe_axes(at_period(machine.network, us)) for us in periods_us))
+        else machine._replace(
+            curve=tuple(_most_axes(at_period(machine.network, us), machine.best) for us in periods_us)
+        )
         for machine in machines
     )
     return CompareAnswer(network, tuple(with_curves))
 
 
-def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
+def _is_own_variant(network: Network, name: str) -> bool:
+    """Whether a variant is what the profile has anyway."""
+    bus = network.bus
+    return name in bus.starter.variants and variant_called(bus.title_of(network)) == name
+
+
+def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
+    kind, variant = kind_called(name), variant_called(name)
     try:
-        conversion = converted(network.profile, kind)
+        conversion = converted(network.profile, kind, variant=variant)
     except BusplanError as error:
-        return NotOnKind(kind_named(kind), error.problems)
+        return NotOnKind(kind_named(kind), variant.replace("-", " ").upper() or kind_named(kind).title, error.problems)
     on_kind, assumed = network_of(conversion.profile), conversion.assumed
-    is_own = kind == network.bus.kind
+    is_own = kind == network.bus.kind and not variant
     needed = {} if is_own else settings_to_be_carried(on_kind)
     if needed:
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         assumed = (*tried, *(assumption for assumption in assumed if assumption.key not in needed))
         on_kind = changed(on_kind, needed)
+    smallest = smallest_period(on_kind, with_limits=False)
+    best = best_register(on_kind, smallest)
+    if best is not None:
+        smallest = smallest_period(changed(on_kind, best.changes), with_limits=False)
     rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
     capacity = figures(on_kind, model=on_kind.bus.deciding_model)
     return MachineOnKind(
@@ -228,10 +257,21 @@ def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
         left_out=conversion.left_out,
         figures=capacity,
         after_reset=after_reset(on_kind, capacity),
-        safe=_safe_axes(on_kind),
-        smallest=smallest_period(on_kind, with_limits=False),
+        safe=_most_axes(on_kind, best),
+        smallest=smallest,
         curve=(),
+        best=best,
     )
+
+
+def _most_axes(network: Network, best: SettingForPeriod | None) -> SafeAxes:
+    """The most axes, as the network is set or with a setting that is free to change."""
+    as_set = _safe_axes(network)
+    if best is None:
+        return as_set
+    period_us = float(plain(network.period_us))
+    with_best = _safe_axes(at_period(changed(network, best.changes), period_us))
+    return max(as_set, with_best, key=lambda safe: safe.nodes)
 
 
 def _safe_axes(network: Network) -> SafeAxes:

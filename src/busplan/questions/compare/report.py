@@ -50,13 +50,13 @@ _LEAST_TOP: Final = 10
 _CAPTION: Final = "Most axes that are shown to fit over the period, both logarithmic"
 _COLUMNS: Final = (
     TableColumn("bus", kind="words", wraps=True),
+    TableColumn("smallest period", "us"),
+    TableColumn("most", group="safe axes"),
+    TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
     TableColumn(VERDICT.label, kind="words", wraps=True),
     TableColumn("margin", "us"),
     TableColumn("U", "us"),
     TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True),
-    TableColumn("smallest period", "us"),
-    TableColumn("most", group="safe axes"),
-    TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
     TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True),
 )
 _ASSUMED: Final = (
@@ -111,7 +111,7 @@ def _blocks(answer: CompareAnswer) -> Iterator[Block]:
     if assumed:
         rows = (
             TableRow(
-                (machine.bus.title, Code(assumption.key), short_text(assumption.value), assumption.source),
+                (machine.title, Code(assumption.key), short_text(assumption.value), assumption.source),
                 is_detail=assumption.source == "default",
             )
             for machine, assumption in assumed
@@ -123,17 +123,19 @@ def _blocks(answer: CompareAnswer) -> Iterator[Block]:
 
 
 def _headline(answer: CompareAnswer) -> Sentence:
-    """Say on how many kinds of bus the machine is shown to fit its period, and on which."""
-    carrying = [machine.bus.title for machine in answer.compared if machine.fits]
-    count = len(answer.kinds)
-    where = f": {', '.join(carrying)}" if carrying else ""
+    """Say what the profile's own bus does, and on which others the machine is shown to fit, with what is assumed."""
+    own = next((machine for machine in answer.compared if machine.is_own), None)
+    others = [machine.title for machine in answer.compared if machine.fits and not machine.is_own]
+    words = [] if own is None else [f"{own.figures.verdict} on {own.title}, its own bus"]
+    if len(answer.kinds) > (own is not None):
+        words.append(
+            f"with what is assumed of other buses, shown to fit on {listed(others, 'and') if others else 'none'}"
+        )
     return sentence(
-        f"{{}} at {{}}: shown to fit on {{}} of {{}} {nouns(count, 'kind')} of bus{where}.",
+        f"{{}} at {{}}: {'; '.join(words)}.",
         Code(answer.profile.name),
         period_value(answer.profile.cycle.period_us),
-        count_value(len(carrying)),
-        count_value(count),
-        state=state_of(carrying),
+        state=state_of(others or (own and own.fits)),
     )
 
 
@@ -144,17 +146,17 @@ def _best(answer: CompareAnswer) -> Iterator[Sentence]:
     if shortest:
         us, machine = min(shortest, key=lambda pair: pair[0])
         value = ShownValue(us, "smallest_period_us", "us", 3)
-        yield sentence(f"The smallest period is {{}} on {machine.bus.title}.", value)
+        yield sentence(f"The smallest period is {{}} on {machine.title}.", value)
     most = [(machine.safe.axes, machine) for machine in ranked if machine.safe.axes]
     if most:
         axes, machine = max(most, key=lambda pair: pair[0])
         yield sentence(
-            f"The most axes at {{}} are {{}} on {machine.bus.title}.",
+            f"The most axes at {{}} are {{}} on {machine.title}.",
             period_value(answer.profile.cycle.period_us),
             count_value(axes, SAFE_AXES.key),
         )
     unranked = [
-        f"{machine.bus.title} ({_values(machine.assumed_host)})" for machine in answer.compared if machine.assumed_host
+        f"{machine.title} ({_values(machine.assumed_host)})" for machine in answer.compared if machine.assumed_host
     ]
     if unranked:
         words = f"Not ranked, for the host's own time is assumed there: {listed(unranked, 'and')}."
@@ -168,8 +170,8 @@ def _values(assumed: Sequence[AssumedKey]) -> str:
 def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
     """A row of the table of the kinds."""
     if isinstance(machine, NotOnKind):
-        empty = (ShownValue(None),) * (len(_COLUMNS) - 2)
-        return TableRow((machine.bus.title, Words("not compared", "warns"), *empty))
+        before, after = ((ShownValue(None),) * number for number in (3, len(_COLUMNS) - 5))
+        return TableRow((machine.title, *before, Words("not compared", "warns"), *after))
     figures = machine.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
     unsafe = f", unsafe {machine.bus.safety.setting}" if is_unsafe else ""
@@ -177,13 +179,13 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
     defaults = len(machine.assumed) - len(new)
     count = f"{defaults} {nouns(defaults, 'default')}" if defaults else ""
     cells: tuple[Cell, ...] = (
-        f"{machine.bus.title}{', as it is' if machine.is_own else ''}",
-        Words(f"{figures.verdict}{unsafe}", state_of(machine.fits)),
-        *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
-        machine.bus.figures.term_label(figures.binding_term),
+        f"{machine.title}{', as it is' if machine.is_own else ''}",
         ShownValue(machine.smallest.us, "smallest_period_us", "us", 3),
         ShownValue(machine.safe.axes, SAFE_AXES.key),
         machine.safe.limited_by,
+        Words(f"{figures.verdict}{unsafe}", state_of(machine.fits)),
+        *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
+        machine.bus.figures.term_label(figures.binding_term),
         ", ".join(filter(None, (_values(new), count))) or "-",
     )
     return TableRow(cells)
@@ -192,7 +194,7 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
 def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
     """Say of a kind what stands in the way, what execution times mean on it, and what it is checked against."""
     if isinstance(machine, NotOnKind):
-        return Sentence((f"{machine.bus.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
+        return Sentence((f"{machine.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
     figures, bus = machine.figures, machine.bus
     sentences = []
     broken = [limit.words(machine.network) for limit in limits_behind(figures, machine.network)]
@@ -203,8 +205,11 @@ def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
     sentences += reset_sentence(machine.after_reset, machine.network)
     if execution := _execution(machine, network):
         sentences.append(Sentence((execution,)))
+    if machine.best is not None:
+        values = " and ".join(f"{key} = {short_text(value)}" for key, value in machine.best.changes.items())
+        sentences.append(Sentence((f"The smallest period is with {values}, which is free to change.",)))
     sentences.append(Sentence((f"Checked against {checked_against(bus)}.",)))
-    return joined(Sentence((f"{bus.title}:",)), *sentences)
+    return joined(Sentence((f"{machine.title}:",)), *sentences)
 
 
 def _execution(machine: MachineOnKind, network: Network) -> str:
@@ -214,7 +219,7 @@ def _execution(machine: MachineOnKind, network: Network) -> str:
         return ""
     if not machine.bus.has_execution(machine.network):
         return "No execution time is in its cycle." if is_in_profile else ""
-    title = network.bus.title
+    title = network.bus.title_of(network)
     none = "" if is_in_profile else f"; no execution time is in the cycle of {title} as this profile sets it"
     assumed = f"Execution times are assumed to be as long as on {title}; here they are: {machine.bus.starter.base}"
     return f"{assumed}{none}."
@@ -225,7 +230,7 @@ def _left_out(answer: CompareAnswer) -> Iterator[Sentence]:
     titles: dict[tuple[str, ...], list[str]] = {}
     for machine in answer.compared:
         if machine.left_out:
-            titles.setdefault(machine.left_out, []).append(machine.bus.title)
+            titles.setdefault(machine.left_out, []).append(machine.title)
     for left_out, names in titles.items():
         keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
         has_rate = any(key.startswith(("group.", "payload.")) and key.endswith(".every") for key in left_out)
@@ -253,7 +258,7 @@ def _drawing(answer: CompareAnswer, *, title: str) -> Drawing:
 def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> Curve:
     """A point for each period that carries an axis; no axes have no place on a logarithmic scale."""
     points = [(point.period_us, point.axes) for point in machine.curve if point.axes]
-    title = machine.bus.title
+    title = machine.title
     label = f"{title}{' (this profile)' if machine.is_own else ''}{'' if points else ': none'}"
     return Curve(
         Entry(ink, label, mark, "line"),
@@ -267,7 +272,7 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
     tested = parts_tested(machine.bus.evidence_data)
     head = {
         "kind": machine.bus.kind,
-        "title": machine.bus.title,
+        "title": machine.title,
         "is_own": False,
         "why_not": [],
         "set_by": parts_by(tested.set_by),
@@ -275,7 +280,12 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
         "not_tested": list(tested.untested),
     }
     if isinstance(machine, NotOnKind):
-        empty: Record = dict.fromkeys((*_FIGURES, "verdict_after_reset", *_SAFE, "smallest_period_us", "no_period"))
+        empty: Record = dict.fromkeys(
+            (
+                *(*_FIGURES, "verdict_after_reset", *_SAFE),
+                *("smallest_period_us", "smallest_period_with", "no_period"),
+            )
+        )
         lists: Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
         return {**head, "why_not": list(machine.why), **empty, **lists}
     return {
@@ -285,6 +295,7 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
         "verdict_after_reset": None if machine.after_reset is None else machine.after_reset.verdict,
         **_safe_record(machine.safe),
         "smallest_period_us": machine.smallest.us,
+        "smallest_period_with": {} if machine.best is None else dict(machine.best.changes),
         "no_period": None if machine.smallest.us else machine.smallest.need.why,
         "assumed": [assumed._asdict() for assumed in machine.assumed],
         "assumed_host": [assumed.key for assumed in machine.assumed_host],
