@@ -1,5 +1,6 @@
 """Numbers and equations with their sources, numbers with a grade of certainty, and inputs of a derivation."""
 
+import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -79,6 +80,20 @@ def read_toml(package: str, name: str) -> dict[str, Any]:
     return tomllib.loads((files(package) / name).read_text(encoding="utf-8"))
 
 
+CHANGED_CONSTANTS: Final = "BUSPLAN_CONSTANTS"
+"""Environment variable with other values of constants, as NAME=VALUE;NAME=VALUE, read when a kind of bus is loaded."""
+
+
+def _as_changed(number: Sourced) -> Sourced:
+    """A constant, or the value that the environment gives it, which is assumed."""
+    pairs = (pair.partition("=") for pair in os.environ.get(CHANGED_CONSTANTS, "").split(";"))
+    value = next((value for name, _, value in pairs if name == number.name), None)
+    if value is None:
+        return number
+    words = {slot: getattr(number, slot) for slot in Sourced.__slots__}
+    return Sourced(float(value), **{**words, "grade": "assumed", "source": f"changed, was {number:g}: {number.source}"})
+
+
 class Constants(dict[str, Sourced]):
     """Sourced constants of a kind of bus by name, in the order of their TOML files.
 
@@ -103,12 +118,13 @@ class Constants(dict[str, Sourced]):
     def __init__(self, package: str, *names: str) -> None:
         for file in names or ("constants.toml",):
             for name, words in _entries("", read_toml(package, file)):
-                self[name] = Sourced(**{"value": nan, **words}, name=name)
+                self[name] = _as_changed(Sourced(**{"value": nan, **words}, name=name))
 
     def computed(self, name: str, value: float) -> Sourced:
         """Give a constant the value that its file leaves to Python."""
-        number = self[name] = Sourced(value, **{slot: getattr(self[name], slot) for slot in Sourced.__slots__})
-        return number
+        number = Sourced(value, **{slot: getattr(self[name], slot) for slot in Sourced.__slots__})
+        self[name] = _as_changed(number)
+        return self[name]
 
     def by_key(self, name: str) -> Mapping[str, Sourced]:
         """Constants of one name by key."""

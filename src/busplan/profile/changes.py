@@ -7,16 +7,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import combinations
+from math import isfinite
 from string import ascii_letters, digits
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from busplan.english import has_controls, listed
+from busplan.english import did_you_mean, has_controls, listed
 from busplan.errors import BusplanError, PlacedError
+from busplan.sourced import CHANGED_CONSTANTS
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
 
 SET: Final = "--set"
+CONSTANTS: Final = "constants"
+"""Section of --set for constants of the model: constants.ARBITRATION_HOLD_US."""
 _KEY: Final = re.compile(r"[A-Za-z0-9_-]{1,100}(?:\.[A-Za-z0-9_-]{1,100}){0,9}")
 _WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _VALUE: Final = "value"
@@ -80,8 +84,13 @@ class KeyChanges:
 
     @property
     def values(self) -> dict[str, object]:
-        """New value by dotted key."""
-        return {change.key: change.value for change in self.entries}
+        """New value by dotted key of the profile."""
+        return {change.key: change.value for change in self.entries if change.sections[0] != CONSTANTS}
+
+    @property
+    def constants(self) -> tuple[KeyChange, ...]:
+        """Changes of constants, which are no keys of a profile."""
+        return tuple(change for change in self.entries if change.sections[0] == CONSTANTS)
 
     @property
     def by_set(self) -> tuple[KeyChange, ...]:
@@ -110,6 +119,32 @@ class KeyChanges:
         return override(
             profile, self.values, origin={change.key: f"{change.typed}{change.note}" for change in self.entries}
         )
+
+
+def use_constants(changes: KeyChanges) -> None:
+    """Use other values of constants in this process and in those that it starts; before a kind of bus is loaded.
+
+    Raises
+    ------
+    BusplanError
+        There is no such constant, or its value is no number.
+    """
+    if not changes.constants:
+        return
+    values = {change.sections[-1].upper(): change for change in changes.constants}
+    for change in values.values():
+        if not isinstance(change.value, int | float) or isinstance(change.value, bool) or not isfinite(change.value):
+            raise BusplanError(f"{change.typed}: expected a finite number")
+    os.environ[CHANGED_CONSTANTS] = ";".join(f"{name}={change.value}" for name, change in values.items())
+    from busplan.buses import kind_named, kind_names  # noqa: PLC0415 - they read their constants when they are loaded
+
+    known = {name: number for kind in kind_names() for name, number in kind_named(kind).constants.items()}
+    for name, change in values.items():
+        if name not in known:
+            hint = did_you_mean(name, known) or "`busplan explain PROFILE` lists them"
+            raise BusplanError(f"{change.typed}: no constant of this name; {hint}")
+        if known[name] != change.value:
+            raise BusplanError(f"{change.typed}: constants were read already; run it in a new process")
 
 
 NO_CHANGES: Final = KeyChanges()

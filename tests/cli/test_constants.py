@@ -1,0 +1,49 @@
+"""A constant of the model with another value: it reaches every figure, and every answer names it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+
+
+def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    """The program in a process of its own: constants are read when it starts."""
+    command = [sys.executable, "-c", "from busplan.__main__ import main; main()", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env={"PYTHONPATH": str(SOURCE)})
+
+
+def result(*options: str) -> Any:
+    done = run("capacity", "paper-4ms", "--format", "json", *options)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
+    plain, changed = result(), result("--set", "constants.arbitration_hold_us=2.63")
+    assert changed["changes"] == {"constants.arbitration_hold_us": 2.63}
+    before, after = (document["results"][0] for document in (plain, changed))
+    assert before["timing_model"] == "paper"
+    # Two nodes, a read and a write of each; a transaction has two arbitrations, each 1 us longer (equation (4)).
+    assert after["cycle_arbitration_us"] - before["cycle_arbitration_us"] == pytest.approx(2 * 2 * 2 * 1.0)
+    done = run("explain", "paper-4ms", "--set", "constants.ARBITRATION_HOLD_US=2.63", "--all")
+    row = next(line for line in done.stdout.splitlines() if "ARBITRATION_HOLD_US" in line and "2.63" in line)
+    assert "assumed" in row
+    assert done.stdout.startswith("With --set constants.ARBITRATION_HOLD_US=2.63.")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("constants.arbitration_hold=2", "no constant of this name; did you mean ARBITRATION_HOLD_US?"),
+        ("constants.arbitration_hold_us=long", "expected a finite number"),
+        ("constants.arbitration_hold_us=nan", "expected a finite number"),
+    ],
+)
+def test_what_is_no_constant_is_refused(text: str, words: str) -> None:
+    done = run("capacity", "paper-4ms", "--set", text)
+    assert (done.returncode, words in done.stderr) == (2, True), done.stderr
