@@ -203,7 +203,7 @@ def circle_test_command(
         if plot is not None and any(test.runs):
             say(f"wrote {plot}")
         elif plot is not None:
-            say(f"{plot}: not written, for no period fits the bus: nothing to draw")
+            say(f"{plot}: not written: no period fits the bus, so there is nothing to draw")
         give(test)
     if test.passed is False:
         raise PlanFailsError

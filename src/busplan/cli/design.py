@@ -540,7 +540,7 @@ def import_command(
         raise BusplanError("-: only one FILE can be standard input")
     new = None if output == STANDARD_OUTPUT else output
     if new is not None and new.suffix.lower() != ".toml":
-        raise BusplanError(f"--output {new}: expected a name ending in .toml, for it is a profile")
+        raise BusplanError(f"--output {new}: expected a name ending in .toml: it is a profile")
     inputs = [Path(path) for path in paths]
     require_apart({"--output": new}, inputs=inputs, of_profiles=True)
     with ExitStack() as files:

@@ -294,7 +294,7 @@ class GroupSection(NodeSection, PayloadSection):
     def _has_payloads(self) -> Self:
         empty = [
             Problem(
-                f"makes a payload of 0 bytes, for the group has no axes; give {kind}_bytes",
+                f"makes a payload of 0 bytes: the group has no axes; give {kind}_bytes",
                 key=self.key_of(kind),
                 kind="inconsistent",
             )

@@ -44,7 +44,7 @@ class Move(NamedTuple):
 
     @property
     def setpoints(self) -> int:
-        """Number of set-points: of periods of the move, the last of them begun [1]."""
+        """Set-points of the move, the last partial period included [1]."""
         return math.ceil(self.duration_s / (self.period_us / _US_PER_S) - _ROUNDING_PERIODS)
 
 

@@ -143,5 +143,5 @@ def test_the_words_name_grade_and_periods_that_are_not_drawn() -> None:
     drawing = run(*SMALL.items(), periods_us=(4000.0, 100.0)).drawing()
     assert (drawing.title, *drawing.words) == (
         *("paper-4ms", "circle test, servo values: 6 assumed, 4 calibrated, 2 published"),
-        "not drawn, for the bus does not carry it: 100 us",
+        "not drawn: the bus does not carry 100 us",
     )

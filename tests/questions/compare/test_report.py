@@ -50,7 +50,7 @@ def test_a_kind_whose_host_is_assumed_is_not_ranked() -> None:
     assert lines_of(found)[1:4] == [
         "The smallest period is 432.255 us on IEEE 1394.",
         "The most axes at 1 ms are 12 on IEEE 1394.",
-        "Not ranked, for the host's own time is assumed there: EtherCAT (bus.master_us = 40).",
+        "Not ranked, because the host's time is assumed: EtherCAT (bus.master_us = 40).",
     ]
     own, other = found.to_dict()["buses"]
     assert (own["assumed_host"], other["assumed_host"]) == ([], ["bus.master_us"])

@@ -257,7 +257,7 @@ def read(text: str, folder: Path) -> busplan.Profile:
         (
             "read_bytes = 8             # assumed\n",
             "read_bytes_per_axis = 4\n",
-            "group.io.read_bytes_per_axis = 4: makes a payload of 0 bytes, for the group has no axes; give read_bytes",
+            "group.io.read_bytes_per_axis = 4: makes a payload of 0 bytes: the group has no axes; give read_bytes",
         ),
         ("nodes = 4\n", "", "group.drives.nodes: missing key. Nodes of the group; for example nodes = 2"),
         ("nodes = 4\n", "nodes = 0\n", "group.drives.nodes = 0: must be 1 or more"),

@@ -184,7 +184,7 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    words = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
+    words = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load: the plan has no "
     assert f"{words}data bit rate." in answer.remarks
     assert "1 remote frame: the length code is shown as data." in answer.remarks
     assert figure(answer, "error frames").recorded == 1

@@ -459,7 +459,7 @@ class _Log:
         yield from faults(frames, self.stretch)
         fd, switched = (int(np.count_nonzero(flags)) for flags in (frames.is_fd, frames.switched))
         if fd:
-            left = f", {switched:,} in no load, for the plan has no data bit rate"
+            left = f", {switched:,} in no load: the plan has no data bit rate"
             left = left if switched and not self.has_switch else ""
             yield f"{plural(fd, 'frame')} of CAN FD: in the load with half of the possible stuff bits{left}."
         if frames.remote:

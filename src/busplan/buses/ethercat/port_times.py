@@ -142,7 +142,7 @@ def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
     lines = [hops for hops in lines if len(hops) == len(lines[-1])]
     means_us = tuple(sum(hops) / len(hops) for hops in zip(*lines, strict=True))
     if means_us:
-        remarks.append("The delay of device 1 and its cable is not in port times, for the master's port has none.")
+        remarks.append("The delay of device 1 and its cable is not in port times: the master's port has none.")
     return LineDelays(means_us, len(lines), tuple(remarks))
 
 

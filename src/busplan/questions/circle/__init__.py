@@ -68,7 +68,7 @@ CIRCLE_FIGURES: Final = (
     REQUIRED,
     AVAILABLE,
     Figure("servo_grade", "grade", "profile", "how the servo values are known", "servo values", sort="word"),
-    Figure("ideal_drive", "ideal", "profile", "whether an ideal drive was simulated, for the profile has no [servo]"),
+    Figure("ideal_drive", "ideal", "profile", "whether an ideal drive was simulated: the profile has no [servo]"),
     Figure("stable", "stable", "loop", "whether both position loops are stable", "stable", sort="truth", better="more"),
     Figure(
         "phase_margin_deg",

@@ -348,7 +348,7 @@ def circle_drawing(test: CircleTestAnswer) -> Drawing:
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
     words = [f"circle test, {servo}"]
     if missing:
-        words.append(f"not drawn, for the bus does not carry it: {', '.join(missing)}")
+        words.append(f"not drawn: the bus does not carry {', '.join(missing)}")
     panels = (
         panel for row in rows for panel in (_circle(row, scales), _errors(row, scales), _ranking(row, rows, scales))
     )

@@ -159,7 +159,7 @@ def _best(answer: CompareAnswer) -> Iterator[Sentence]:
         f"{machine.title} ({_values(machine.assumed_host)})" for machine in answer.compared if machine.assumed_host
     ]
     if unranked:
-        words = f"Not ranked, for the host's own time is assumed there: {listed(unranked, 'and')}."
+        words = f"Not ranked, because the host's time is assumed: {listed(unranked, 'and')}."
         yield Sentence((words,), "warns")
 
 

@@ -110,9 +110,7 @@ def _headline(plan: PlanAnswer) -> Sentence:
     result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
-    first = (
-        "" if plan.period_is_kept else f"the period must change, for no change of {_freed(plan, PERIOD)} is enough: "
-    )
+    first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
     changes = _settings(plan.goal, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
