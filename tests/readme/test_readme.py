@@ -267,7 +267,7 @@ DOCUMENTS = {
     "paper": "",
     "profiles": "",
 }
-FREE = {"changes", "measured", "recommended_changes", "varied", "execution", "notes", "answers"}
+FREE = {"changes", "smallest_period_with", "measured", "recommended_changes", "varied", "execution", "notes", "answers"}
 """What holds keys of a profile, or others that are not the document's own."""
 
 
