@@ -94,6 +94,25 @@ def test_the_margin_is_said_in_repeated_frames(run: Run, plan_file: Path) -> Non
         assert (result.verdict == "fits") is verdict
 
 
+def test_an_endless_response_is_laid_to_the_errors_that_make_it(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    text = HEAD + "error_period_us = 332\n" + MESSAGES.replace("10000", "1000")
+    path.write_text(text, encoding="utf-8")
+    assert (
+        "for with it and repeated frames the bus has a load of 127.0%;" in run("check", path.name, cwd=tmp_path).stdout
+    )
+    # Without errors it is in time; a single one in each 332 us is too many.
+    assert "repeated frames a single one makes door late" in run("capacity", path.name, cwd=tmp_path).stdout
+
+
+def test_a_timeline_shows_repeated_frames(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    path.write_text(HEAD + ERRORS + "error_burst = 2\n" + MACHINE, encoding="utf-8")
+    events = json.loads(run("timeline", path.name, "--format", "json", cwd=tmp_path).stdout)["events"]
+    # 31 bits and 8 bytes, at 2 us a bit.
+    assert [one["duration_us"] for one in events if one["kind"] == "repeated"] == [2 * (31 + 135)] * 2
+
+
 def test_a_plan_that_fails_has_no_margin_in_repeated_frames(run: Run, plan_file: Path) -> None:
     changes = (
         "--set",

@@ -63,6 +63,7 @@ EVENTS: Final = (
     EventKind("host", "host", "profile", "h", "idle"),
     EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
     EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
+    EventKind("repeated", "repeated frame", "Tindell 1994", "r", "contention"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
 """Kinds of events, in the order of the cycle."""
@@ -220,8 +221,9 @@ class CanCycle(BusCycle):
         yield from feedback
         yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
         for count, (message, us, _) in zip(counts, self._before, strict=True):
-            label = message.name if message.name == REPEATED else f"message {message.name}"
-            yield Run((BusEvent("message", "cycle_interference_us", us, label),), count)
+            label = "repeated frame" if message.name == REPEATED else f"message {message.name}"
+            kind = "repeated" if message.name == REPEATED else "message"
+            yield Run((BusEvent(kind, "cycle_interference_us", us, label),), count)
         yield from commands
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
@@ -413,9 +415,9 @@ class CanCycle(BusCycle):
             lines.append(("latest message", f"{latest.name}, {words}"))
         most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
         if most >= 0:
-            broken = f", one more makes {self._late_with(most + 1)} late" if most < MOST_REPEATED else ""
-            words = f"up to {most} in a row keep every deadline" if most else "not one keeps every deadline"
-            lines.append(("repeated frames", words + broken))
+            kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"
+            broken = f" makes {self._late_with(most + 1)} late" if most < MOST_REPEATED else " was not tried"
+            lines.append((REPEATED, kept + broken))
         return tuple(lines)
 
     def _late_with(self, repeated: int) -> str:

@@ -370,7 +370,7 @@ def _of_message(message: Message, traffic: Traffic) -> Stream:
     )
 
 
-def repeated(sent: Iterable[Stream], traffic: Traffic) -> Stream:
+def repeated(sent: Sequence[Stream], traffic: Traffic) -> Stream:
     """What errors cost some streams, as a sender before all of them: E(t) = (n_burst + ceil(t / T_error) - 1) C.
 
     An error takes `ERROR_BITS` and the longest of their frames again, for it may hit its last bit.
@@ -388,21 +388,10 @@ def repeated(sent: Iterable[Stream], traffic: Traffic) -> Stream:
     frame's own C; the caller adds the longest C.
     """
     longest_us = reduce(larger, (stream.frame_us for stream in sent))
-    return Stream(
-        REPEATED,
-        group="",
-        block=-1,
-        first=-1,
-        identifiers=1,
-        data_bytes=0,
-        frame_us=ERROR_BITS * bit_us(traffic.bit_rate_kbit_s) + longest_us,
-        period_us=traffic.error_period_us,
-        jitter_us=0.0,
-        deadline_us=traffic.error_period_us,
-        identifier_bits=BASE_BITS,
-        is_message=True,
-        burst=traffic.error_burst,
-    )
+    us = ERROR_BITS * bit_us(traffic.bit_rate_kbit_s) + longest_us
+    times_us = {"frame_us": us, "period_us": traffic.error_period_us, "jitter_us": 0.0}
+    errors = sent[0]._replace(name=REPEATED, group="", block=-1, first=-1, identifiers=1, is_message=True)
+    return errors._replace(**times_us, burst=traffic.error_burst)
 
 
 def repeated_by_place(sent: Sequence[Stream], traffic: Traffic) -> Iterator[Stream]:
