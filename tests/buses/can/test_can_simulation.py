@@ -525,6 +525,11 @@ def test_an_error_lets_a_frame_of_a_lower_priority_block_again() -> None:
     reads_us = ((VERGE_US,) * CYCLES,)
     found = run(own, Moments(reads_us, (0,) * CYCLES, queued, queued, 0, (start_us + FRAME_US - 2 * VERGE_US,)))
     assert own.lasts_us - 3 * VERGE_US <= found.cycles_us[1] <= own.lasts_us
+    # A second error comes where the cycle with all of the first lasts longer than the time between them.
+    for early_us, errors in ((10, 2), (-10, 1)):
+        twice = judged(own.traffic._replace(errors=(int(own.lasts_us) - early_us, 1)), slack_us=5000)
+        assert twice is not None
+        assert twice.lasts_us == own.lasts_us + (errors - 1) * (ERROR_BITS + FRAME_US)
 
 
 @pytest.mark.parametrize("host_us", [0, 1, 80])
