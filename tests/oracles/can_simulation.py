@@ -3,9 +3,11 @@
 Every sender queues its frames; whenever the bus is free, the queued frame with the smallest identifier goes, and
 nothing interrupts it. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind
 SYNC, the host queues all commands some time behind the last feedback, and a node executes its command some time behind
-its last frame. Other messages are queued whenever the caller says. Times are whole numbers of any unit.
+its last frame. Other messages are queued whenever the caller says. An error breaks the frame that is on the bus, which
+stays queued, and holds the bus for a while. Times are whole numbers of any unit.
 """
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from typing import Final, NamedTuple
@@ -57,6 +59,8 @@ class Run(NamedTuple):
     """From the start of each cycle to the queued commands."""
     responses_us: tuple[tuple[int, ...], ...]
     """From the due instant of each instance of each message to its end, of those that were sent."""
+    ends_us: tuple[int, ...]
+    """End of each frame."""
 
 
 def simulate(
@@ -67,6 +71,8 @@ def simulate(
     period_us: int,
     host_us: Sequence[int],
     late_us: int = 0,
+    errors_us: Sequence[int] = (),
+    error_us: int = 0,
 ) -> Run:
     """Run as many cycles as there are host times.
 
@@ -82,15 +88,18 @@ def simulate(
         From the last feedback to the queued commands, cycle by cycle.
     late_us
         A frame that is queued so long behind the start of another still takes part in its arbitration.
+    errors_us, error_us
+        Instants of errors, ascending, and how long each holds the bus. Those without a frame on the bus do nothing.
     """
     bus = _Bus(sync, nodes, messages, period_us, host_us)
-    bus.run(late_us)
+    bus.run(late_us, errors_us, error_us)
     return Run(
         tuple(bus.ends),
         tuple(bus.syncs),
         tuple(map(tuple, bus.feedback)),
         tuple(bus.commands),
         tuple(map(tuple, bus.responses)),
+        tuple(bus.frame_ends),
     )
 
 
@@ -119,6 +128,7 @@ class _Bus:
         """Command frames that have not arrived, of each cycle and node."""
         self.queue: list[tuple[int, int, int, tuple[int, ...]]] = []
         """When each frame is queued, its identifier, its time, and whose it is."""
+        self.frame_ends: list[int] = []
         for cycle in range(cycles):
             self.put(cycle * period_us, sync, SYNC, cycle)
         for number, message in enumerate(messages):
@@ -129,8 +139,9 @@ class _Bus:
         """Queue a frame."""
         heappush(self.queue, (when_us, frame.identifier, frame.us, owner))
 
-    def run(self, late_us: int) -> None:
+    def run(self, late_us: int, errors_us: Sequence[int], error_us: int) -> None:
         """Send every frame: whenever the bus is free, that of the smallest identifier."""
+        errors = deque(errors_us)
         pending: list[tuple[int, int, tuple[int, ...]]] = []
         now_us = 0
         while self.queue or pending:
@@ -138,8 +149,14 @@ class _Bus:
                 now_us = max(now_us, self.queue[0][0])
             while self.queue and self.queue[0][0] <= now_us + late_us:
                 heappush(pending, heappop(self.queue)[1:])
+            while errors and errors[0] < now_us:
+                errors.popleft()
+            if errors and errors[0] < now_us + pending[0][1]:
+                now_us = errors.popleft() + error_us
+                continue
             _, us, (sort, *whose) = heappop(pending)
             now_us += us
+            self.frame_ends.append(now_us)
             _ARRIVED[sort](self, now_us, *whose)
 
     def sync_arrived(self, now_us: int, cycle: int) -> None:

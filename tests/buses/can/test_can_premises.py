@@ -1,6 +1,7 @@
 """What a verdict on CAN rests on: a bit rate that is assumed, priority queues, no repeated frames."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,61 @@ def test_so_do_the_lines_of_json(run: Run, plan_file: Path) -> None:
     lines = document["verdicts"][0]["lines"]
     assert {"label": "rests on", "text": "priority queues: assumed; no repeated frames"} in lines
     assert {"label": "assumed", "text": "bus.bit_rate_kbit_s: measure it first"} in lines
+
+
+ERRORS = "error_period_us = 100000\n"
+
+
+def test_errors_are_what_it_rests_on_then(run: Run, plan_file: Path) -> None:
+    plan_file.write_text(plan_file.read_text("utf-8").replace(HEAD, HEAD + ERRORS), encoding="utf-8")
+    said = run("capacity", plan_file.name, cwd=plan_file.parent).stdout
+    assert "priority queues: assumed; repeated frames: 1 every 100000 us" in said
+    said = run("capacity", plan_file.name, "--set", "bus.error_burst=3", cwd=plan_file.parent).stdout
+    assert "repeated frames: 3 at once, 1 every 100000 us" in said
+
+
+def test_the_margin_is_said_in_repeated_frames(run: Run, plan_file: Path) -> None:
+    said = run("capacity", plan_file.name, cwd=plan_file.parent).stdout
+    (margin,) = re.findall(
+        r"repeated frames +up to (\d+) in a row keep every deadline, one more makes ([\w ]+) late", said
+    )
+    most, late = int(margin[0]), margin[1]
+    assert late == ("door" if "door" in plan_file.read_text("utf-8") else "the cycle")
+    # So many errors in a row, and no other: the verdict is the same, and with one more it is not.
+    for burst, verdict in ((most, True), (most + 1, False)):
+        errors = {"bus.error_period_us": 1e9, "bus.error_burst": burst}
+        (result,) = busplan.capacity(busplan.load_profile(plan_file, changes=errors)).results[:1]
+        assert (result.verdict == "fits") is verdict
+
+
+def test_an_endless_response_is_laid_to_the_errors_that_make_it(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    text = HEAD + "error_period_us = 332\n" + MESSAGES.replace("10000", "1000")
+    path.write_text(text, encoding="utf-8")
+    assert (
+        "for with it and repeated frames the bus has a load of 127.0%;" in run("check", path.name, cwd=tmp_path).stdout
+    )
+    # Without errors it is in time; a single one in each 332 us is too many.
+    assert "repeated frames a single one makes door late" in run("capacity", path.name, cwd=tmp_path).stdout
+
+
+def test_a_timeline_shows_repeated_frames(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    path.write_text(HEAD + ERRORS + "error_burst = 2\n" + MACHINE, encoding="utf-8")
+    events = json.loads(run("timeline", path.name, "--format", "json", cwd=tmp_path).stdout)["events"]
+    # 31 bits and 8 bytes, at 2 us a bit.
+    assert [one["duration_us"] for one in events if one["kind"] == "repeated"] == [2 * (31 + 135)] * 2
+
+
+def test_a_plan_that_fails_has_no_margin_in_repeated_frames(run: Run, plan_file: Path) -> None:
+    changes = (
+        "--set",
+        "message.door.deadline_us=100" if "door" in plan_file.read_text("utf-8") else "cycle.period_us=500",
+    )
+    done = run("capacity", plan_file.name, *changes, cwd=plan_file.parent)
+    assert "FIT" in done.stdout
+    assert "repeated frames  " not in done.stdout
+    assert "up to" not in done.stdout
 
 
 def test_an_assumed_bit_rate_warns_where_it_stands(run: Run, plan_file: Path) -> None:

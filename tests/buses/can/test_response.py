@@ -185,6 +185,54 @@ def test_networks_have_the_responses_of_the_printed_equations(seed: int, form: s
             )
 
 
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("sizes", [(8, 8), (0, 8)], ids=["alike", "unlike"])
+@pytest.mark.parametrize("seed", range(12))
+def test_repeated_frames_take_what_tindell_and_burns_print(seed: int, sizes: tuple[int, int], form: str) -> None:
+    random = Random(seed)
+    messages = [
+        {
+            "payload_bytes": random.randint(*sizes),
+            "period_us": random.choice([5000, 9000, 20_000, 33_000]),
+            "jitter_us": random.choice([0, 0, 700]),
+        }
+        for _ in range(random.randint(2, 12))
+    ]
+    errors = textbook.Errors(random.choice([2000, 7000, 40_000]), random.choice([1, 2, 4]))
+    own: Any = network(*messages, error_period_us=errors.period_us, error_burst=errors.burst)
+    each = [
+        textbook.Sender(BIT_US * (55 + 10 * one.payload_bytes), int(one.period_us), int(one.jitter_us))
+        for one in own.message
+    ]
+    for place, one in enumerate(latencies(own, form=form)):
+        blocking_us = max((lower.frame_us for lower in each[place + 1 :]), default=0)
+        expected = textbook.response_us(
+            each[place], each[:place], blocking_us=blocking_us, bit_us=BIT_US, errors=errors
+        )
+        assert expected is not None
+        # E is of the wait and the longest frame of all, not of the frame itself: one error more, at most.
+        more_us = 0 if sizes[0] == sizes[1] else (31 + 135) * BIT_US
+        assert expected[0] <= one["worst_response_us"] <= expected[0] + more_us
+
+
+@pytest.mark.parametrize("burst", [1, 3])
+def test_a_frame_is_repeated_from_its_last_bit_on(burst: int) -> None:
+    # 270 us a frame of 8 bytes, 110 of none; an error holds the bus for 31 bits, 62 us.
+    short, full = {"period_us": 100_000, "payload_bytes": 0}, {"period_us": 100_000}
+    own = network(short, full, short, error_period_us=50_000, error_burst=burst)
+    assert responses_us(own) == [270 + 110 + burst * (62 + 110), *[us + burst * (62 + 270) for us in (490, 490)]]
+
+
+def test_an_error_in_each_frame_leaves_no_response_time() -> None:
+    assert responses_us(network({"period_us": 1000}, error_period_us=332)) == [None]
+    assert responses_us(network({"period_us": 10_000}, error_period_us=500)) != [None]
+
+
+def test_a_burst_of_errors_asks_for_their_period() -> None:
+    with pytest.raises(busplan.BusplanError, match=r"error_burst = 2: asks for error_period_us"):
+        network({"period_us": 1000}, error_burst=2)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_both_forms_give_the_same_floats(seed: int) -> None:
     own = random_network(Random(seed), count=60, load=0.9)
@@ -262,16 +310,19 @@ def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
     assert len(set(swept["fits"])) > 1
 
 
+@pytest.mark.parametrize("errors", [{}, {"bus.error_period_us": 1500, "bus.error_burst": 2}], ids=["none", "errors"])
 @pytest.mark.parametrize("profile", ["can-servo-8", "canopen-6", "can-fd-arm-7"])
-def test_a_derivation_lists_the_frames_that_were_counted(profile: str) -> None:
-    derivations = busplan.explain(profile, "worst_response_us").to_dict()["derivations"]
+def test_a_derivation_lists_the_frames_that_were_counted(profile: str, errors: dict[str, int]) -> None:
+    derivations = busplan.explain(busplan.load_profile(profile, changes=errors), "worst_response_us").to_dict()[
+        "derivations"
+    ]
     assert len(derivations) > 5
     for one in derivations:
         for step in one["steps"]:
             before, _, listed = step["formula"].partition(", in its worst instance")
             if not before.startswith("frames of higher priorities before "):
                 continue
-            frames = re.findall(r"(\d+) [\w-]+ of ([\d.]+) us", listed)
+            frames = re.findall(r"(\d+) [\w -]+ of ([\d.]+) us", listed)
             assert sum(int(number) * float(us) for number, us in frames) == pytest.approx(step["value"])
             assert bool(frames) == bool(step["value"])
 
@@ -284,3 +335,13 @@ def test_a_derivation_of_a_burst_has_its_periods() -> None:
     assert steps["burst"] == ("frames of m0 that may come at once", 5)
     assert steps["backlog_us"] == ("q C - (q - b + 1) T", 4 * 270)
     assert [one["name"] for one in first["inputs"] if one["name"].endswith("burst")] == ["message.m0.burst"]
+
+
+@pytest.mark.parametrize("key", ["error_burst", "error_period_us"])
+def test_a_sweep_of_errors_has_at_each_point_what_the_point_has(key: str) -> None:
+    own = network({"period_us": 5000, "deadline_us": 2000}, {"period_us": 9000}, error_period_us=3000, error_burst=1)
+    values = {"error_burst": [1, 3, 9], "error_period_us": [350, 3000, 90_000]}[key]
+    swept = busplan.sweep(own, vary={f"bus.{key}": values}, timing_model=[WORST])
+    alone = [figures(busplan.load_profile(own, changes={f"bus.{key}": value})).fits for value in values]
+    assert list(swept["fits"]) == alone
+    assert len(set(alone)) > 1

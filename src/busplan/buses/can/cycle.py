@@ -1,5 +1,6 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
 
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, partial, reduce
@@ -7,10 +8,11 @@ from itertools import chain
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, TERMS, bit_us, payload_us
+from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, MOST_REPEATED, TERMS, bit_us, payload_us
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
+    REPEATED,
     SYNC,
     Message,
     Pdos,
@@ -19,14 +21,16 @@ from busplan.buses.can.frames import (
     frame_sizes,
     last_identifier,
     place,
+    repeated,
     streams,
     traffic_of,
 )
 from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
-from busplan.buses.limits import EventKind
+from busplan.buses.limits import COVERAGE, EventKind
 from busplan.buses.network import Group, Network, Rate
+from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import (
     FIT_ROUNDING,
     Number,
@@ -38,8 +42,10 @@ from busplan.elementwise import (
     plain,
     pointwise,
     rounded_up,
+    square_root,
     total,
     value_of,
+    within,
 )
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
@@ -57,6 +63,7 @@ EVENTS: Final = (
     EventKind("host", "host", "profile", "h", "idle"),
     EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
     EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
+    EventKind("repeated", "repeated frame", "Tindell 1994", "r", "contention"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
 """Kinds of events, in the order of the cycle."""
@@ -80,10 +87,12 @@ class CanCycle(BusCycle):
     term_figures = TERMS
     command_events = (("command", "command_frame"),)
 
-    def __init__(self, network: Network, model: str, number: int | None = None) -> None:
+    def __init__(self, network: Network, model: str, number: int | None = None, *, repeated: int | None = None) -> None:
         self.network = network
         self.model = model
         self.number = number
+        self.repeated = repeated
+        """Frames that are repeated in a row, if not as the profile has it [1]."""
 
     @property
     def rates(self) -> tuple[Rate, ...]:
@@ -111,6 +120,8 @@ class CanCycle(BusCycle):
     def traffic(self) -> Traffic:
         """SYNC, PDOs and other messages, their frames as long as in the timing model."""
         traffic = traffic_of(self.network)
+        if self.repeated is not None:
+            traffic = replace(traffic, error_burst=self.repeated)
         return traffic if self.model == WORST else replace(traffic, is_stuffed=False)
 
     def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
@@ -146,7 +157,19 @@ class CanCycle(BusCycle):
     def _before(self) -> tuple[tuple[Message, Number, Number], ...]:
         """Messages that may go before the last PDO, each with the time of its frame, and whether it does."""
         messages = ((message, us, self._goes_before_last(message)) for message, us in self._messages)
-        return tuple(message for message in messages if message[2] is not False)
+        before = tuple(message for message in messages if message[2] is not False)
+        return before if is_off(self.traffic.error_burst) else (*before, (*self._repeated, True))
+
+    @property
+    def _repeated(self) -> tuple[Message, Number]:
+        """What errors cost the cycle, as a message that goes before all, and its time."""
+        traffic = self.traffic
+        us = traffic.ask(
+            lambda traffic: repeated(streams(traffic), traffic).frame_us, words="31 bits and the longest frame of all"
+        )
+        period_us = traffic.error_period_us
+        message = Message(REPEATED, -1, 0, period_us, 0.0, period_us, burst=traffic.error_burst)
+        return message, named(us, "repeated_us", "C,repeated")
 
     @cached_property
     def sync_us(self) -> Number:
@@ -198,7 +221,9 @@ class CanCycle(BusCycle):
         yield from feedback
         yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
         for count, (message, us, _) in zip(counts, self._before, strict=True):
-            yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
+            label = "repeated frame" if message.name == REPEATED else f"message {message.name}"
+            kind = "repeated" if message.name == REPEATED else "message"
+            yield Run((BusEvent(kind, "cycle_interference_us", us, label),), count)
         yield from commands
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
@@ -238,13 +263,18 @@ class CanCycle(BusCycle):
         blocking_us, counts = self._waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
         return blocking_us + total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
 
+    @property
+    def _is_disturbed(self) -> bool:
+        """Whether it may wait for other messages or for repeated frames."""
+        return bool(self._messages or self._before)
+
     @cached_property
     def _waits(self) -> tuple[Number, tuple[Number, ...]]:
         return self._waits_beside(self._on_bus_us + 0.0)
 
     def _waits_beside(self, others_us: Number) -> tuple[Number, tuple[Number, ...]]:
         """Blocking [us], and how many frames of each message go before the last PDO [1]."""
-        if not self._messages:
+        if not self._is_disturbed:
             return 0.0, ()
         others_us = named(others_us, "others_us", "others")
 
@@ -294,7 +324,7 @@ class CanCycle(BusCycle):
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
-        if not self._messages or not self.traffic.has_cycle:
+        if not self._is_disturbed or not self.traffic.has_cycle:
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
@@ -323,8 +353,12 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """Each node offers its highest message first, and no error repeats a frame."""
-        return "priority queues: assumed", "no repeated frames"
+        """Each node offers its highest message first, and how often an error repeats a frame."""
+        if is_off(self.traffic.error_burst):
+            return "priority queues: assumed", "no repeated frames"
+        burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
+        at_once = f"{burst:g} at once, " if burst > 1 else ""
+        return "priority queues: assumed", f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -372,14 +406,31 @@ class CanCycle(BusCycle):
         if self.traffic.has_rates:
             fullest = self._in_cycle_us / self.traffic.period_us + self._messages_load
             words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
-        load = ("load", words)
-        if not self._messages:
-            return (load,)
-        answers = message_responses(self.traffic)
-        latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
-        if worst.us == inf:
-            return load, ("latest message", f"{latest.name}, without a worst-case response time")
-        return load, ("latest message", f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}")
+        lines = [("load", words)]
+        if self._messages:
+            answers = message_responses(self.traffic)
+            latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
+            response = f"{_short(worst.us)} us of {_short(latest.deadline_us)}"
+            words = response if worst.us < inf else "without a worst-case response time"
+            lines.append(("latest message", f"{latest.name}, {words}"))
+        most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
+        if most >= 0:
+            kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"
+            broken = f" makes {self._late_with(most + 1)} late" if most < MOST_REPEATED else " was not tried"
+            lines.append((REPEATED, kept + broken))
+        return tuple(lines)
+
+    def _late_with(self, repeated: int) -> str:
+        """What is late, or not shown to be in time, with some repeated frames in a row; empty where nothing is."""
+        trial = CanCycle(self.network, self.model, repeated=repeated)
+        for message, worst in message_responses(trial.traffic, is_verdict=True):
+            if not within(worst.us, message.deadline_us):
+                return message.name
+        if not trial.traffic.has_cycle:
+            return ""
+        doubt_us = COVERAGE * square_root(total(doubt.us * doubt.us for doubt in trial.doubts()))
+        slice_us = time_slice_us(self.network.period_us, slice_ratio=self.network.slice_ratio, nodes=1)
+        return "" if within(trial.required_us + trial.added_us(doubt_us), slice_us) else "the cycle"
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""

@@ -56,6 +56,8 @@ MOST_BLOCKS: Final = CONSTANTS["MOST_BLOCKS"]
 MAX_LOAD: Final = CONSTANTS["MAX_LOAD"]
 SATURATED: Final = CONSTANTS["SATURATED"]
 MOST_STEPS: Final = CONSTANTS["MOST_STEPS"]
+ERROR_BITS: Final = CONSTANTS["ERROR_BITS"]
+MOST_REPEATED: Final = CONSTANTS["MOST_REPEATED"]
 EXPECTED_STUFFING: Final = CONSTANTS["EXPECTED_STUFFING"]
 
 KBIT_US = 1000
@@ -312,7 +314,7 @@ TERMS: Final = (
         "cycle_interference_us",
         "I",
         _EQUATIONS,
-        "other messages of higher priorities than the last PDO that arrive while the cycle lasts",
+        "other messages of higher priorities than the last PDO that arrive while the cycle lasts, and repeated frames",
         "interference",
         ink="contention",
         letter="I",
@@ -334,7 +336,13 @@ LATENCY_TABLE: Final = (
     Figure("data_bytes", "s", "profile", "data of the last frame", "data, bytes", sort="count"),
     Figure("jitter_us", "J", "profile", "how late it may be queued", "jitter J"),
     Figure("blocking_us", "B", _EQUATIONS, "longest frame of a lower priority", "blocking B"),
-    Figure("interference_us", "I", _EQUATIONS, "frames of higher priorities before it", "interference I"),
+    Figure(
+        "interference_us",
+        "I",
+        _EQUATIONS,
+        "frames of higher priorities before it, and repeated frames",
+        "interference I",
+    ),
     Figure("instance", "q", _EQUATIONS, "worst instance of the busy period, from 0", "worst instance q", sort="count"),
     Figure("backlog_us", "q (C - T)", _EQUATIONS, "instances before it, less their periods", "backlog q (C - T)"),
     Figure("frame_us", "C", _EQUATIONS, "the frame itself", "frame C"),

@@ -1,6 +1,6 @@
 """The frames of a CAN network: who sends them, how often, and with what priority."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache, reduce
 from itertools import chain, islice, repeat
@@ -9,12 +9,14 @@ from typing import Any, Final, NamedTuple, TypeAlias
 from busplan.buses.can.equations import (
     BASE_BITS,
     COMMAND_IDENTIFIER,
+    ERROR_BITS,
     FD_FRAME_BYTES,
     FEEDBACK_IDENTIFIER,
     FRAME_BYTES,
     MAX_IDENTIFIER,
     MOST_PDOS,
     PDO_STEP,
+    bit_us,
     frame_us,
     share_bytes,
 )
@@ -25,6 +27,7 @@ from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKin
 FOLLOWS: Final = -1
 """Instead of an identifier: the next behind those of the group before."""
 SYNC: Final = "SYNC"
+REPEATED: Final = "repeated frames"
 LOOP: Final = "loop"
 """Name of the way from SYNC to the executed commands."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
@@ -89,6 +92,10 @@ class Traffic:
     """The slowest execution of any node, from SYNC to its queued feedback [us]."""
     host_us: Number = 0.0
     """From the last feedback to the queued commands [us]."""
+    error_period_us: Number = MAX_TIME_US
+    """From one error on the wire to the next; of bursts the mean time [us]."""
+    error_burst: Number = 0
+    """Errors that may come at once, each of which repeats a frame; 0 without errors [1]."""
     pdos: tuple[Pdos, ...] = ()
     messages: tuple[Message, ...] = ()
     is_stuffed: bool = True
@@ -210,6 +217,8 @@ def _traffic(network: Network) -> Traffic:
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
         data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
         identifier_bits=bus.identifier_bits,
+        error_period_us=MAX_TIME_US if bus.error_period_us is None else bus.error_period_us,
+        error_burst=0 if bus.error_period_us is None else 1 if bus.error_burst is None else bus.error_burst,
         messages=tuple(_message(message, bus, network.nodes) for message in network.profile.message),
     )
     if not groups:
@@ -359,6 +368,44 @@ def _of_message(message: Message, traffic: Traffic) -> Stream:
         is_message=True,
         burst=message.burst,
     )
+
+
+def repeated(sent: Sequence[Stream], traffic: Traffic) -> Stream:
+    """What errors cost some streams, as a sender before all of them: E(t) = (n_burst + ceil(t / T_error) - 1) C.
+
+    An error takes `ERROR_BITS` and the longest of their frames again, for it may hit its last bit.
+
+    Parameters
+    ----------
+    sent
+        The streams whose frames may be repeated.
+    traffic
+        What is sent, with the errors.
+
+    References
+    ----------
+    K. Tindell, A. Burns, Guaranteeing message latencies on Controller Area Network, 1994. There E is of w + C with the
+    frame's own C; the caller adds the longest C.
+    """
+    longest_us = reduce(larger, (stream.frame_us for stream in sent))
+    us = ERROR_BITS * bit_us(traffic.bit_rate_kbit_s) + longest_us
+    times_us = {"frame_us": us, "period_us": traffic.error_period_us, "jitter_us": 0.0}
+    errors = sent[0]._replace(name=REPEATED, group="", block=-1, first=-1, identifiers=1, is_message=True)
+    return errors._replace(**times_us, burst=traffic.error_burst)
+
+
+def repeated_by_place(sent: Sequence[Stream], traffic: Traffic) -> Iterator[Stream]:
+    """What errors cost each stream and those before it, as senders that add up to it; none without errors."""
+    if is_off(traffic.error_burst):
+        return
+    # Errors count until the frame itself has gone; one that is queued takes part in an arbitration for a bit.
+    jitter_us = reduce(larger, (stream.frame_us for stream in sent)) - bit_us(traffic.bit_rate_kbit_s)
+    before_us: Points = 0.0
+    for stream in sorted(sent, key=lambda stream: stream.block):
+        cost = repeated([stream], traffic)
+        longer_us = larger(before_us, cost.frame_us)
+        yield cost._replace(block=stream.block, frame_us=longer_us - before_us, jitter_us=jitter_us)
+        before_us = longer_us
 
 
 def _cyclic(traffic: Traffic) -> Iterator[Stream]:

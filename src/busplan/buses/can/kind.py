@@ -129,6 +129,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit", short="identifiers of {} bits"),
         "bus.host_us": Key("host"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
+        "bus.error_period_us": Key("T_error"),
+        "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default=SYNC_IDENTIFIER),
         "limits.max_load": Key(default=MAX_LOAD),
         "payload.pdo_per": Key(short="PDOs of each {}"),

@@ -9,7 +9,7 @@ from typing import Final
 
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
-from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, streams, traffic_of
+from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, repeated, streams, traffic_of
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
@@ -281,9 +281,11 @@ def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
         if us < inf:
             why = f"its worst-case response time is {us:g} us, over its {message.deadline_us:g} us"
         else:
-            before = (stream for stream in streams(traffic) if stream.block <= message.last_place)
-            load = sum(stream.frames_us / stream.period_us for stream in before)
-            why = f"it has no worst-case response time, for with it the bus has a load of {load:.1%}"
+            before = [stream for stream in streams(traffic) if stream.block <= message.last_place]
+            errors = [repeated(before, traffic)] if traffic.error_burst else []
+            load = sum(stream.frames_us / stream.period_us for stream in (*before, *errors))
+            these = "it and repeated frames" if errors else "it"
+            why = f"it has no worst-case response time, for with {these} the bus has a load of {load:.1%}"
             if load < SATURATED:
                 why += f", and its busy period takes over {MOST_STEPS:.0f} steps to find"
         yield RuleProblem(f"message.{message.name}.deadline_us", why, *subject.cure())

@@ -104,6 +104,17 @@ class CanBus(BusSection):
         description="Standard uncertainty of host_us; without it 10 % of it where it is measured, else half of it [us]",
         examples=[5],
     )
+    error_period_us: PeriodUs | None = Field(
+        default=None,
+        description="Shortest time from one error on the wire to the next, each of which repeats a frame; with "
+        "error_burst the mean time; without it no frame is repeated [us]",
+        examples=[100_000],
+    )
+    error_burst: Count | None = Field(
+        default=None,
+        description="Errors that may come at once, with as many periods to the next burst; without it 1",
+        examples=[3],
+    )
     timing_model: TimingModelName = Field(
         default=WORST,
         description="Timing model whose figures lead the tables, worst-stuffing or no-stuffing; the verdict is always "
@@ -112,10 +123,13 @@ class CanBus(BusSection):
     )
 
     @model_validator(mode="after")
-    def _data_is_no_slower(self) -> Self:
+    def _agrees_with_itself(self) -> Self:
         if self.data_bit_rate_kbit_s is not None and self.data_bit_rate_kbit_s < self.bit_rate_kbit_s:
             why = f"is under bit_rate_kbit_s, {self.bit_rate_kbit_s:g}: CAN FD switches to no slower bit rate"
             raise refused(Problem(why, key="data_bit_rate_kbit_s", kind="inconsistent"))
+        if self.error_period_us is None and self.error_burst is not None:
+            why = "asks for error_period_us, the time from one burst of errors to the next"
+            raise refused(Problem(why, key="error_burst", kind="inconsistent"))
         return self
 
     @property

@@ -10,8 +10,18 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.can import response
 from busplan.buses.can.equations import MOST_BLOCKS, bit_us
-from busplan.buses.can.frames import NAMES, SYNC, Points, Stream, Traffic, last_place, streams
-from busplan.elementwise import choose, plain, smaller, total
+from busplan.buses.can.frames import (
+    NAMES,
+    SYNC,
+    Points,
+    Stream,
+    Traffic,
+    last_place,
+    repeated,
+    repeated_by_place,
+    streams,
+)
+from busplan.elementwise import choose, is_off, plain, smaller, total
 from busplan.english import first_of
 
 if TYPE_CHECKING:
@@ -64,7 +74,8 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     SYNC, the feedback of the slowest node and the commands each meet an idle bus, or a bus that has just become busy. A
     frame of a lower priority may have started then: three such frames, the longest that can be there. One of a message
     whose deadline D is kept ends within it, so b - 1 + ceil((w + D) / T) of them are there in w. Frames that go before
-    the last PDO go whenever they are queued: b - 1 + ceil((w + J + bit) / T).
+    the last PDO go whenever they are queued: b - 1 + ceil((w + J + bit) / T). So do errors: each takes the time of the
+    longest frame of all, of those that block, too.
 
     Nothing of that is still pending from the cycle before: all that was queued by w behind its start has been sent by
     then, and w is within the period.
@@ -92,6 +103,9 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
             )
             for message in messages
         ]
+    if not is_off(traffic.error_burst):
+        # A frame that blocks may be repeated, too, where the bus is idle behind it.
+        messages.append(repeated(sent, traffic))
     if not messages:
         return Waits(others_us, 0.0, (), most)
     before = [(message, message.first_place <= last) for message in messages]
@@ -140,8 +154,8 @@ def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tu
     sent = streams(traffic)
     messages = [number for number, stream in enumerate(sent) if stream.is_message]
     enough_us = [stream.deadline_us for stream in sent] if is_verdict else None
-    starts, bit = _starts(traffic), bit_us(traffic.bit_rate_kbit_s)
-    return tuple((sent[number], worst) for number, worst in _worst(sent, messages, starts, bit, enough_us=enough_us))
+    worst = _worst(sent, messages, _starts(traffic), traffic, enough_us=enough_us)
+    return tuple((sent[number], response) for number, response in worst)
 
 
 def sync_response(traffic: Traffic) -> Response:
@@ -149,8 +163,8 @@ def sync_response(traffic: Traffic) -> Response:
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    sent, bit = streams(traffic), bit_us(traffic.bit_rate_kbit_s)
-    ((_, worst),) = _worst(sent, [0], [_Start()], bit, blocks=[stream.is_message for stream in sent])
+    sent = streams(traffic)
+    ((_, worst),) = _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])
     return worst
 
 
@@ -160,7 +174,7 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
 
     Arguments are as `message_responses` has them, in plain numbers.
     """
-    sent, bit = streams(traffic), bit_us(traffic.bit_rate_kbit_s)
+    sent = streams(traffic)
     sync = [(sent[0], sync_response(traffic))] if traffic.has_cycle else []
     # The last frame of each PDO.
     ends = {
@@ -168,7 +182,7 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     }
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
-    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], bit)]
+    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], traffic)]
     return (*sync, *pdos, *message_responses(traffic))
 
 
@@ -189,6 +203,10 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
             higher.append(stream)
         elif not blocking and stream.frame_us == worst.blocking_us and (stream.is_message or answered.name != SYNC):
             blocking = stream.label
+    if not is_off(traffic.error_burst):
+        # The same number of errors hits each place.
+        errors = [*repeated_by_place(streams(traffic), traffic)]
+        higher.append(repeated(higher, traffic)._replace(jitter_us=errors[0].jitter_us))
     waited_us = worst.blocking_us + worst.interference_us + worst.instance * answered.frame_us
     window_us = waited_us + bit_us(traffic.bit_rate_kbit_s)
     for start in _starts(traffic) if answered.is_message else [_Start()]:
@@ -260,7 +278,7 @@ def _worst(
     sent: Sequence[Stream],
     answered: Sequence[int],
     starts: Sequence[_Start],
-    bit: Points,
+    traffic: Traffic,
     *,
     blocks: Sequence[bool] | None = None,
     enough_us: Sequence[Points] | None = None,
@@ -275,8 +293,8 @@ def _worst(
         Numbers of those whose response is computed.
     starts
         Where a busy period may begin.
-    bit
-        Time of a bit [us].
+    traffic
+        What else there is: the bit rate and errors.
     blocks
         Whether each stream may hold up one that goes before it; without it all may.
     enough_us
@@ -284,8 +302,9 @@ def _worst(
     """
     if not answered:
         return
-    order = sorted(range(len(sent)), key=lambda number: sent[number].block)
-    ranked, rank_of = [sent[number] for number in order], {number: rank for rank, number in enumerate(order)}
+    both = [*sent, *repeated_by_place(sent, traffic)]
+    order = sorted(range(len(both)), key=lambda number: both[number].block)
+    ranked, rank_of = [both[number] for number in order], {number: rank for rank, number in enumerate(order)}
     # Senders of equal period and jitters are a group: there are fewer groups than senders.
     times_us = [(stream.period_us, *(start.jitter_us(stream) for start in starts)) for stream in ranked]
     groups: dict[Any, int] = {}
@@ -294,11 +313,14 @@ def _worst(
     columns = (
         [stream.last_place for stream in ranked],
         [stream.frame_us for stream in ranked],
-        [sent[number].frame_us if blocks is None or blocks[number] else 0.0 for number in order],
+        [
+            both[number].frame_us if number < len(sent) and (blocks is None or blocks[number]) else 0.0
+            for number in order
+        ],
         [stream.frames_us for stream in ranked],
-        [0.0 if enough_us is None else enough_us[number] for number in order],
+        [0.0 if enough_us is None or number >= len(sent) else enough_us[number] for number in order],
         period_us,
-        [bit],
+        [bit_us(traffic.bit_rate_kbit_s)],
     )
     onces_us = [
         [stream.burst_us + (stream.name in start.late) * stream.frames_us for stream in ranked] for start in starts
