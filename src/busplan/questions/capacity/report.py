@@ -25,7 +25,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import period, sentence_text
 from busplan.questions.base.sentences import FigureColumn, document, fields, figure_table, safety_record, with_profile
 from busplan.questions.capacity import CapacityAnswer
-from busplan.questions.capacity.verdict import Verdict, card, uncertainty_parts
+from busplan.questions.capacity.verdict import Change, Verdict, card, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import leading_model
@@ -156,6 +156,14 @@ def _groups_table(answer: CapacityAnswer) -> Table:
     return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
 
 
+def _change_record(change: Change) -> Record:
+    return {
+        "changes": change.changes,
+        "nodes": change.nodes,
+        **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
+    }
+
+
 def _verdict(verdict: Verdict) -> Record:
     change, figures, bus = verdict.change, verdict.deciding, verdict.network.bus
     missing = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
@@ -175,13 +183,11 @@ def _verdict(verdict: Verdict) -> Record:
         "reserve": verdict.network.profile.limits.reserve,
         "not_in_it": [part.key for part in verdict.left_out],
         "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
-        "cheapest_change": change
-        and {
-            "changes": change.changes,
-            "nodes": change.nodes,
-            **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
-        },
+        "cheapest_change": change and _change_record(change),
+        "setting_change": verdict.setting and _change_record(verdict.setting),
         "fastest_period_us": verdict.fastest and verdict.fastest.us,
+        "faster_with": verdict.best_register
+        and {"changes": verdict.best_register.changes, "period_us": verdict.best_register.period_us},
         "warnings": list(verdict.warnings),
         "text": f"{sentence_text(summary.subject)}: {summary.verdict.text}. {text}.",
         "lines": [{"label": label, "text": line} for label, line in lines],
