@@ -209,7 +209,7 @@ def test_a_broken_profile_is_an_error_with_its_places_and_a_finding_of_check(own
     assert (answer.passed, answer.summary.errors, repr(answer)) == (
         False,
         1,
-        "<CheckAnswer: checked 2 profiles: 1 error, 0 warnings; 1 circle test not run>",
+        "<CheckAnswer: checked 2 profiles: 1 error, 0 warnings; 1 circle test not run; 1 finding suppressed>",
     )
 
 

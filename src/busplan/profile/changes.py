@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.english import did_you_mean, has_controls, listed
 from busplan.errors import BusplanError, PlacedError
-from busplan.sourced import CHANGED_CONSTANTS
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
@@ -135,6 +134,8 @@ def use_constants(changes: KeyChanges) -> None:
     for change in values.values():
         if not isinstance(change.value, int | float) or isinstance(change.value, bool) or not isfinite(change.value):
             raise BusplanError(f"{change.typed}: expected a finite number")
+    from busplan.sourced import CHANGED_CONSTANTS  # noqa: PLC0415 - loads tomllib, which --help does not need
+
     os.environ[CHANGED_CONSTANTS] = ";".join(f"{name}={change.value}" for name, change in values.items())
     from busplan.buses import kind_named, kind_names  # noqa: PLC0415 - they read their constants when they are loaded
 
