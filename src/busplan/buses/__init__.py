@@ -20,6 +20,7 @@ _MODULES: Final[dict[str, str]] = {
     "ethercat": "busplan.buses.ethercat.kind",
     "sercos3": "busplan.buses.sercos.sercos3_kind",
     "sercos2": "busplan.buses.sercos.sercos2_kind",
+    "polled": "busplan.buses.polled.kind",
 }
 _LOADED: Final[dict[str, "Bus"]] = {}
 

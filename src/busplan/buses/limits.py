@@ -195,6 +195,8 @@ class Starter(NamedTuple):
     """Hosts to choose from by name, each with its lines of [bus]; none where the host plays no part."""
     host: str = ""
     """Host of a new profile, unless another is asked for."""
+    sections: Mapping[str, str] = {}
+    """Other sections [bus] by the first word of a name that the kind has, in lower case."""
     period: str = "1ms"
     """Communication period, unless another is asked for."""
     slice_ratio: str = "1            # the whole period is for communication"
@@ -206,9 +208,11 @@ class Starter(NamedTuple):
     more: str = ""
     """Commented lines at the end of the profile."""
 
-    def section(self, host: str | None = None) -> str:
-        """Section [bus] with the lines of a host, by default of `host`."""
-        return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host))))
+    def section(self, host: str | None = None, *, called: str = "") -> str:
+        """Section [bus], by the name that the user calls the kind, with the lines of a host, by default of `host`."""
+        words = "".join(letter if letter.isalnum() else " " for letter in called.casefold()).split()
+        bus = self.sections.get(words[0], self.bus) if words else self.bus
+        return "\n".join(filter(None, (bus, self.hosts.get(host or self.host))))
 
 
 class Cost(IntEnum):

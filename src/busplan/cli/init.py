@@ -168,6 +168,8 @@ class _Values:
         self.given = given
         """Value of each option that is given."""
         self.asks = all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+        self.called = ""
+        """Name of the kind of bus, as the user has it."""
         self.taken: list[str] = []
         """Defaults that nobody was asked about, as options."""
 
@@ -197,7 +199,7 @@ class _Values:
     def kind(self) -> str:
         """Kind of bus; a word that is no kind is asked for again."""
         while True:
-            word = self.value("--bus", f"Kind of bus: {', '.join(kind_names())}", _KIND)
+            word = self.called = self.value("--bus", f"Kind of bus: {', '.join(kind_names())}", _KIND)
             try:
                 return kind_called(word, option="--bus" if "--bus" in self.given else "")
             except BusplanError as refused:
@@ -242,7 +244,7 @@ def _machine(kind: str, values: _Values) -> "Machine":
     if host is not None and host not in starter.hosts:
         hosts = f"there are {', '.join(starter.hosts)}" if starter.hosts else f"a profile of kind {kind} has no host"
         raise BusplanError(f"--host {host}: {hosts}")
-    return Machine(groups, period_us, size, host)
+    return Machine(groups, period_us, size, host, values.called)
 
 
 def _card(text: str) -> list[str]:

@@ -108,6 +108,8 @@ class Machine(NamedTuple):
     """Payload of each axis, in either direction; that of a node without axes and bytes of its own."""
     host: str | None = None
     """Name among the hosts of the kind; None for its usual one."""
+    called: str = ""
+    """Name that the user calls the kind, where it has several starts."""
 
 
 def shared_out(axes: int, *, nodes: int) -> tuple[NodeGroup, ...]:
@@ -149,7 +151,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
-        bus=starter.section(machine.host),
+        bus=starter.section(machine.host, called=machine.called),
         ratio=starter.slice_ratio,
         count="" if first.name else _COUNT.format(nodes=first.nodes),
         parts="\n".join(_part(group, machine=machine, starter=starter, file=file) for group in machine.groups),
