@@ -36,7 +36,8 @@ def init_command(
         str | None,
         option(
             "--bus KIND",
-            f"Kind of bus: {', '.join(kind_names())}, or another of its names, as firewire.  [default: {_KIND}]",
+            f"Kind of bus: {', '.join(kind_names())}, or another of its names, as firewire, profibus or dynamixel.  "
+            f"[default: {_KIND}]",
             autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,

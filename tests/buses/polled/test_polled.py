@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 import busplan
 from busplan import BusplanError, Profile
 from busplan.buses.polled.cycle import PolledCycle
+from busplan.cli import app
 from busplan.questions.fit.network import network_of
 from tests.oracles.polled_simulation import DYNAMIXEL, FEETECH, RATIOS, modbus_us, profibus_us, servos_us
 
@@ -87,7 +89,7 @@ def test_profibus_lies_between_its_ends_and_the_ends_are_simulated(
         return profibus_us(rate, [(write, read)] * nodes, sdr=wait, is_isochronous=is_isochronous)
 
     (result,) = busplan.capacity(profile, timing_model=["standard"]).results
-    middle_us, u_us = result.required_us, result.uncertainty_us
+    middle_us, u_us = result.required_us, float(result.uncertainty_us or 0)
     assert required_us(profile, "typical") == pytest.approx(simulated(32), rel=1e-9)
     assert middle_us - u_us == pytest.approx(simulated(32), rel=1e-9)
     assert middle_us + u_us == pytest.approx(simulated(RATIOS[rate][0]), rel=1e-9)
@@ -291,6 +293,7 @@ def test_a_plan_asks_all_at_once_and_sets_the_return_delay(tmp_path: Path) -> No
     )
     path.write_text(text.replace("period_us = 10000", "period_us = 8000"), encoding="utf-8")
     plan = busplan.plan(path, free=["return_delay", "requests"])
+    assert plan.recommended is not None
     assert dict(plan.recommended.changes) == {"bus.requests": "sync", "bus.return_delay_us": 0.0}
 
 
@@ -302,3 +305,34 @@ def test_a_command_of_an_exchange_rests_on_the_cycle_before() -> None:
     # Node 1 has its command with the request; all servos have theirs with the sync write at the end.
     assert drives_of.arrival_us(1) == pytest.approx(163.75 + 976 / 12 + (33 + 209) / 12)
     assert arm.arrival_us(1) == arm.arrival_us(14) == pytest.approx(6760)
+
+
+@pytest.mark.parametrize(
+    ("word", "protocol"),
+    [
+        ("profibus", "profibus-dp"),
+        ("PROFIBUS DP", "profibus-dp"),
+        ("modbus", "modbus-rtu"),
+        ("Dynamixel 2", "dynamixel-2"),
+        ("feetech", "feetech"),
+        ("worldfip", "worldfip"),
+        ("polled", "profibus-dp"),
+    ],
+)
+def test_a_new_profile_is_of_the_bus_that_is_asked_for(word: str, protocol: str, tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    done = CliRunner().invoke(app, ["init", str(path), "--bus", word, "--nodes", "6", "--axes", "6"])
+    assert done.exit_code == 0, done.output
+    assert busplan.load_profile(path).bus.protocol == protocol
+
+
+def test_a_sweep_is_its_points() -> None:
+    answer = busplan.sweep(
+        "profibus-drives-6",
+        vary={"bus.bit_rate_kbit_s": [187.5, 1500.0, 12000.0], "bus.retries": [0, 2]},
+        timing_model=["standard"],
+    )
+    columns = (answer[name] for name in ("bus.bit_rate_kbit_s", "bus.retries", "required_us"))
+    for rate, retries, us in zip(*columns, strict=True):
+        profile = changed("profibus-drives-6", bus__bit_rate_kbit_s=float(rate), bus__retries=int(retries))
+        assert us == pytest.approx(required_us(profile), rel=1e-12)

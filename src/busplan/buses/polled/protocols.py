@@ -121,7 +121,9 @@ def times(network: Network) -> Times:
     delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
     most_bits = protocol.most_turn_bits if bus.max_turn_bits is None else bus.max_turn_bits
     shortest_us = silence_us + _bits_us(protocol.least_turn_bits, bit_us) + delay_us
-    longest_us = larger(silence_us + _bits_us(most_bits, bit_us) + delay_us, shortest_us)
+    longest_us = shortest_us
+    if not is_off(most_bits):
+        longest_us = larger(silence_us + most_bits * bit_us + delay_us, shortest_us)
     after_us = silence_us + _bits_us(most_bits, bit_us)
     # An arbiter waits once more before it answers a request of its own.
     silent_us = after_us * (2 if bus.protocol == "worldfip" else 1)
