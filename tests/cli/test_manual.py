@@ -14,7 +14,7 @@ Refused = Callable[..., str]
 
 TOPICS = [
     *("can", "circle", "commands", "ethercat", "gate", "import"),
-    *("json", "limits", "measured", "models", "plan", "profile", "python", "sercos"),
+    *("json", "limits", "measured", "models", "plan", "polled", "profile", "python", "sercos"),
 ]
 
 
@@ -75,7 +75,9 @@ def test_an_unknown_topic_is_refused_with_the_known_ones(refused: Refused, topic
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("typed", "offered"), [("busplan man", "manual"), ("busplan manual p", "plan profile python")])
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("busplan man", "manual"), ("busplan manual p", "plan polled profile python")]
+)
 def test_its_name_and_topics_are_completed(run: Run, typed: str, offered: str) -> None:
     at = str(len(typed.split()) - 1)
     done = run(env={"_BUSPLAN_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": at})

@@ -111,7 +111,42 @@ def profiles_by_kind() -> dict[str, st.SearchStrategy[busplan.Profile]]:
         "ethercat": ethercat_profiles(),
         "sercos3": sercos_profiles(_sercos3_bus()),
         "sercos2": sercos_profiles(_sercos2_bus()),
+        "polled": sercos_profiles(_polled_bus(), (2000.0, 10_000.0, 50_000.0)),
     }
+
+
+def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
+    """Each protocol with each way to ask, global control and retries where it has them."""
+    ways = {
+        "profibus-dp": ["exchange"],
+        "modbus-rtu": ["exchange", "single"],
+        "dynamixel-2": ["sync", "single"],
+        "feetech": ["sync", "single"],
+        "worldfip": ["single"],
+    }
+
+    def of_protocol(protocol: str) -> st.SearchStrategy[dict[str, Any]]:
+        is_profibus = protocol == "profibus-dp"
+        return st.fixed_dictionaries(
+            {
+                "kind": st.just("polled"),
+                "protocol": st.just(protocol),
+                "nodes": st.integers(1, 20),
+                "bit_rate_kbit_s": st.sampled_from([115.2, 500.0, 1000.0]),
+                "requests": st.sampled_from(ways[protocol]),
+                "reads": st.integers(1, 3),
+                "writes": st.integers(1, 3),
+                "adapter_us": st.floats(0.0, 2000.0),
+                "host_us": st.floats(0.0, 200.0),
+                "global_control": st.just(is_profibus),
+                "retries": st.integers(0, 2),
+                "timeout_us": st.floats(0.0, 3000.0),
+                "max_turn_bits": st.one_of(st.none(), st.floats(40.0, 100.0)),
+                "return_delay_us": st.none() if is_profibus else st.one_of(st.none(), st.floats(0.0, 500.0)),
+            }
+        )
+
+    return st.sampled_from(sorted(ways)).flatmap(of_protocol)
 
 
 def _sercos3_bus() -> st.SearchStrategy[dict[str, Any]]:
@@ -145,15 +180,19 @@ def _sercos2_bus() -> st.SearchStrategy[dict[str, Any]]:
 
 
 @st.composite
-def sercos_profiles(draw: st.DrawFn, bus: st.SearchStrategy[dict[str, Any]]) -> busplan.Profile:
-    """Random profiles of a SERCOS bus, at periods that it allows and at one that it does not."""
+def sercos_profiles(
+    draw: st.DrawFn,
+    bus: st.SearchStrategy[dict[str, Any]],
+    periods_us: tuple[float, ...] = (125.0, 250.0, 500.0, 1000.0, 1100.0),
+) -> busplan.Profile:
+    """Random profiles of a SERCOS or polled bus, at periods that SERCOS allows and at one that it does not."""
     own = draw(bus)
     data = {
         "schema_version": 1,
         "name": "test",
         "bus": own,
         "cycle": {
-            "period_us": draw(st.sampled_from([125.0, 250.0, 500.0, 1000.0, 1100.0])),
+            "period_us": draw(st.sampled_from(periods_us)),
             "slice_ratio": draw(st.floats(0.1, 1.0)),
             "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
         },

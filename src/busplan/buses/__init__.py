@@ -20,6 +20,7 @@ _MODULES: Final[dict[str, str]] = {
     "ethercat": "busplan.buses.ethercat.kind",
     "sercos3": "busplan.buses.sercos.sercos3_kind",
     "sercos2": "busplan.buses.sercos.sercos2_kind",
+    "polled": "busplan.buses.polled.kind",
 }
 _LOADED: Final[dict[str, "Bus"]] = {}
 
@@ -83,11 +84,12 @@ def variant_called(word: str) -> str:
 
     Examples
     --------
-    >>> variant_called("CAN FD"), variant_called("CAN")
-    ('can-fd', '')
+    >>> variant_called("CAN FD"), variant_called("CAN"), variant_called("PROFIBUS DP")
+    ('can-fd', '', 'profibus')
     """
-    names = (name for kind in kind_names() for name in kind_named(kind).starter.variants)
-    return next((name for name in names if _plain(name) == _plain(word)), "")
+    first = _plain(word.replace("-", " ").partition(" ")[0])
+    names = [name for kind in kind_names() for name in kind_named(kind).starter.variants]
+    return next((name for name in names if _plain(name) in (_plain(word), first)), "")
 
 
 def _plain(name: str) -> str:

@@ -204,7 +204,7 @@ class Starter(NamedTuple):
     node: str = ""
     """Commented lines of a node, for what no default is right for."""
     variants: Mapping[str, str] = {}
-    """Further lines of [bus] for another bus of the kind, by its name: "can-fd"."""
+    """Another bus of the kind by its name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
     rate: str = ""
     """Key of [bus] with a bit rate that a user is asked for; empty where there is one alone."""
     base: str = "what a node does in each cycle"
@@ -213,8 +213,10 @@ class Starter(NamedTuple):
     """Commented lines at the end of the profile."""
 
     def section(self, host: str | None = None, variant: str = "") -> str:
-        """Section [bus] with the lines of a host, by default of `host`, and of a variant."""
-        return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host), self.variants.get(variant))))
+        """Section [bus] with the lines of a host, by default of `host`, and those of a variant, or its own section."""
+        more = self.variants.get(variant, "")
+        bus, more = (more, "") if more.startswith("[bus]") else (self.bus, more)
+        return "\n".join(filter(None, (bus, self.hosts.get(host or self.host), more)))
 
 
 class Cost(IntEnum):

@@ -17,9 +17,9 @@ app = typer.Typer(
     cls=LazyGroup,
     help="""Does this motion network fit its period, how many axes can it carry, and is the circle still round?
 
-    busplan answers from one TOML profile of a host and motion nodes on IEEE 1394 (FireWire), CAN, EtherCAT or SERCOS.
-    Some profiles are shipped (see `busplan profiles`); `busplan init` writes one to start from. `busplan COMMAND
-    --help` describes a command.
+    busplan answers from one TOML profile of a host and motion nodes on IEEE 1394 (FireWire), CAN, EtherCAT, SERCOS or
+    a polled bus: PROFIBUS, Modbus, WorldFIP, serial servos. Some profiles are shipped (see `busplan profiles`);
+    `busplan init` writes one to start from. `busplan COMMAND --help` describes a command.
 
     Example: busplan capacity paper-4ms
     """,

@@ -117,8 +117,8 @@ def latency_command(
 
     On IEEE 1394 it times one read and one write of the farthest node, or, in the broadcast schedule, the data and the
     commands of all nodes; on CAN the worst-case response time of every message, and a loop over feedback and commands;
-    on EtherCAT a command, feedback, and a loop over both; on SERCOS feedback and commands of all nodes. Times are in
-    us, sizes in bytes; each phase has its equation or source. Exits 0 with any figures.
+    on EtherCAT a command, feedback, and a loop over both; on SERCOS feedback and commands of all nodes; on a polled bus
+    the whole cycle. Times are in us, sizes in bytes; each phase has its equation or source. Exits 0 with any figures.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """

@@ -481,6 +481,9 @@ def compare_command(
 ) -> None:
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
+    The kinds are those of the paper: IEEE 1394, CAN, SERCOS, and the field buses whose master polls (PROFIBUS and
+    WorldFIP, the Factory Instrumentation Protocol, of which a new profile has PROFIBUS); beside them EtherCAT.
+
     The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
     On its own kind the profile stays as it is. On another kind it gets the bus of a new profile, which is assumed; keys
     that only its own kind has are left out, and named. The smallest period [us] is the one at which this machine is

@@ -37,7 +37,8 @@ def init_command(
         str | None,
         option(
             "--bus KIND",
-            f"Kind of bus: {', '.join(kind_names())}, can-fd, or another name, as firewire.  [default: {_KIND}]",
+            f"Kind of bus: {', '.join(kind_names())}, or another name, as firewire, can-fd, profibus or dynamixel.  "
+            f"[default: {_KIND}]",
             autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,

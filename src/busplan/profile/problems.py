@@ -147,6 +147,8 @@ def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyP
         if len(members) > 1 and any(part in _tag(member) for member in members):
             members = [member for member in members if part in _tag(member)]
             continue
+        if isinstance(part, str) and part.startswith("("):
+            continue  # the tag of a union without a key `kind`
         path.append(part)
         if isinstance(part, int):
             continue  # one of the tables of a key

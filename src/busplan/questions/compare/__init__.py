@@ -50,6 +50,8 @@ class SafeAxes(NamedTuple):
 class MachineOnKind(NamedTuple):
     """The machine on one kind of bus."""
 
+    name: str
+    """Name of the kind, or of a variant of it."""
     network: Network
     is_own: bool
     """Whether this is the kind of the profile, where the machine stays as it is."""
@@ -103,6 +105,8 @@ class MachineOnKind(NamedTuple):
 class NotOnKind(NamedTuple):
     """A kind of bus that cannot have the machine."""
 
+    name: str
+    """Name of the kind, or of a variant of it."""
     bus: Bus
     title: str
     """Name of the bus, for people."""
@@ -149,7 +153,7 @@ class CompareAnswer(Answer):
         KeyError
             The kind is not among those compared.
         """
-        return {variant_called(machine.title) or machine.bus.kind: machine for machine in self.kinds}[kind]
+        return {machine.name: machine for machine in self.kinds}[kind]
 
     def drawing(self) -> Drawing:
         """The most axes over the period, a curve for each kind of bus.
@@ -205,8 +209,11 @@ def compare(
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
     network = network_of(require_cycle(load_profile(profile), question="compare"))
-    kinds = (*kind_names(), *(name for kind in kind_names() for name in kind_named(kind).starter.variants))
-    names = (network.bus.kind, *kinds) if buses is None else [str(kind) for kind in one_or_several(buses, name="buses")]
+    variants = {name: lines for kind in kind_names() for name, lines in kind_named(kind).starter.variants.items()}
+    kinds = (*kind_names(), *variants)
+    # A variant with a section of its own is another choice of a bus that stands here already.
+    usual = (*kind_names(), *(name for name, lines in variants.items() if not lines.startswith("[bus]")))
+    names = (network.bus.kind, *usual) if buses is None else [str(kind) for kind in one_or_several(buses, name="buses")]
     for name in names:
         if name not in kinds:
             near = did_you_mean(name, kinds)
@@ -236,7 +243,9 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     try:
         conversion = converted(network.profile, kind, variant=variant)
     except BusplanError as error:
-        return NotOnKind(kind_named(kind), variant.replace("-", " ").upper() or kind_named(kind).title, error.problems)
+        return NotOnKind(
+            name, kind_named(kind), variant.replace("-", " ").upper() or kind_named(kind).title, error.problems
+        )
     on_kind, assumed = network_of(conversion.profile), conversion.assumed
     is_own = kind == network.bus.kind and not variant
     needed = {} if is_own else settings_to_be_carried(on_kind)
@@ -251,6 +260,7 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
     capacity = figures(on_kind, model=on_kind.bus.deciding_model)
     return MachineOnKind(
+        name=name,
         network=on_kind,
         is_own=is_own,
         assumed=tuple(rates) if is_own else assumed,

@@ -1,0 +1,1 @@
+"""Buses whose master asks its nodes one by one, with their protocols."""

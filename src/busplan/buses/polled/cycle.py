@@ -1,0 +1,267 @@
+"""The cycle of a polled bus: request, turn-around, answer, next."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property, reduce
+from typing import Final, Literal
+
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Run
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.limits import EventKind
+from busplan.buses.network import Group, Network
+from busplan.buses.polled.protocols import ADAPTER_SHARE, BUFFERED, Protocol, Requests, Times, protocol_of, times
+from busplan.elementwise import Number, is_everywhere, is_off, larger, total
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
+
+TimingModelName = Literal["standard", "typical"]
+STANDARD: Final[TimingModelName] = "standard"
+TYPICAL: Final[TimingModelName] = "typical"
+
+_WIRE: Final = "protocol"
+RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate", "bit rate, kbit/s", decimals=None)
+TERMS: Final = (
+    Figure("cycle_once_us", "T_once", _WIRE, "token and GAP, once a cycle", "token and GAP", ink="sync", letter="T"),
+    Figure(
+        "cycle_global_us", "T_GC", _WIRE, "broadcast that opens the cycle", "global control", ink="sync", letter="S"
+    ),
+    Figure("cycle_request_us", "T_req", _WIRE, "requests of the master", "requests", ink="out", letter="R"),
+    Figure(
+        "cycle_turn_us",
+        "T_turn",
+        _WIRE,
+        "waits for answers, nodes' own time included",
+        "turn-around",
+        ink="work",
+        letter="W",
+    ),
+    Figure("cycle_answer_us", "T_ans", _WIRE, "answers of the nodes", "answers", ink="in", letter="A"),
+    Figure("cycle_gap_us", "T_gap", _WIRE, "idle bus before and after telegrams", "idle times", ink="gap", letter="G"),
+    Figure(
+        "cycle_adapter_us",
+        "T_adapter",
+        "profile",
+        "the host's adapter, for each request with answers",
+        "adapter",
+        ink="contention",
+        letter="U",
+    ),
+    Figure(
+        "cycle_retry_us", "T_retry", "profile", "requests that are repeated", "retries", ink="contention", letter="Y"
+    ),
+    Figure(
+        "cycle_host_us", "T_host", "profile", "the host between feedback and commands", "host", ink="work", letter="H"
+    ),
+    NONPERIODIC,
+)
+FIGURES: Final = BusFigures(TERMS, setup=(RATE,), headings=(RATE.key,))
+EVENTS: Final = (
+    EventKind("once", "token and GAP", _WIRE, "t", "sync"),
+    EventKind("global", "global control", _WIRE, "s", "sync"),
+    EventKind("gap", "idle time", _WIRE, ".", "gap"),
+    EventKind("request", "request", _WIRE, ">", "out"),
+    EventKind("turn", "turn-around", _WIRE, "=", "work"),
+    EventKind("answer", "answer", _WIRE, "<", "in"),
+    EventKind("adapter", "adapter of the host", "profile", "u", "contention"),
+    EventKind("retry", "retry", "profile", "y", "contention"),
+    EventKind("host", "host", "profile", "h", "work"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+STRETCHES: Final = (
+    EventKind("exchange", "exchange", "", "X", "in"),
+    EventKind("read", "read", "", "R", "in"),
+    EventKind("write", "write", "", "W", "out"),
+)
+
+
+class PolledCycle(BusCycle):
+    """All feedback, then all commands; or an exchange with each node in turn."""
+
+    term_figures = TERMS
+    command_events = (("exchange", "request"), ("write", "request"))
+
+    def __init__(self, network: Network, model: str) -> None:
+        self.network = network
+        self.is_typical = model == TYPICAL
+
+    @property
+    def _protocol(self) -> Protocol:
+        return protocol_of(self.network.profile.bus)
+
+    @cached_property
+    def _times(self) -> Times:
+        return times(self.network)
+
+    @property
+    def way(self) -> Requests:
+        """How nodes are asked."""
+        way: Requests = self.network.profile.bus.requests or self._protocol.requests[0]
+        return way
+
+    @cached_property
+    def _turn_us(self) -> Number:
+        """Wait for an answer: the middle of typical and longest, to which U reaches on both sides [us]."""
+        between = self._times
+        is_exact = self.is_typical or between.longest_turn is between.typical_turn
+        return between.typical_turn if is_exact else (between.typical_turn + between.longest_turn) / 2
+
+    def _wire_us(self, size: Number) -> Number:
+        """Time of a telegram of a size [us]."""
+        us: Number = size * self._protocol.bits_per_byte * 1000 / self.network.profile.bus.bit_rate_kbit_s
+        return us
+
+    def written(self) -> Iterator[BusEvent | Run]:
+        """Token, broadcast, reads, the host, writes, repeated requests, and the window for the rest."""
+        bus, groups = self.network.profile.bus, tuple(enumerate(self.network.groups))
+        yield BusEvent("once", "cycle_once_us", self._times.once, "token and GAP")
+        if bus.global_control:
+            idle_us = self._times.before + self._times.silent
+            global_us = self._wire_us(self._protocol.global_bytes) + idle_us
+            yield BusEvent("global", "cycle_global_us", global_us, "global control")
+        host = BusEvent("host", "cycle_host_us", bus.host_us, "host", rests_on="bus.host_us")
+        if self.way == "exchange":
+            yield host
+            for place, group in groups:
+                yield self._single("exchange", place, group)
+        for kind in TRANSACTION_KINDS if self.way != "exchange" else ():
+            for place, group in groups:
+                yield from self._sync(kind, place, group) if self.way == "sync" else (self._single(kind, place, group),)
+            if kind == "read":
+                yield host
+        yield BusEvent("retry", "cycle_retry_us", self._retry_us, "repeated requests")
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+
+    @property
+    def _retry_us(self) -> Number:
+        """Requests of the longest kind that nobody answers, each with its timeout [us]."""
+        retries: Number = self.network.profile.bus.retries
+        if is_off(retries):
+            return 0.0
+        longest_us = reduce(larger, map(self._longest_us, self.network.groups))
+        return retries * (self._times.before + longest_us + self._times.timeout)
+
+    def _longest_us(self, group: Group) -> Number:
+        protocol = self._protocol
+        if self.way == "exchange":
+            return self._wire_us(protocol.exchange_request_bytes + group.write_bytes)
+        if self.way == "sync":
+            return self._wire_us(protocol.sync_read_bytes + group.nodes * protocol.sync_node_bytes)
+        written = protocol.write_request_bytes + self._data("write", group)
+        return self._wire_us(larger(protocol.read_request_bytes, written))
+
+    def _times_a_cycle(self, kind: TransactionKind) -> Number:
+        bus = self.network.profile.bus
+        times_a_cycle: Number = bus.reads if kind == "read" else bus.writes
+        return times_a_cycle
+
+    def _data(self, kind: TransactionKind, group: Group) -> Number:
+        """Mean data of a request of a node [bytes]."""
+        size = group.read_bytes if kind == "read" else group.write_bytes
+        return size / self._times_a_cycle(kind)
+
+    def _execution_us(self, kind: str, group: Group) -> Number:
+        """Own time of a node before it answers; 0 where it answers from a buffer [us]."""
+        if self.network.profile.bus.protocol in BUFFERED:
+            return 0.0
+        read_us, write_us = group.read_execution_us, group.write_execution_us
+        own_us = {"read": read_us, "write": write_us}.get(kind)
+        return (larger(read_us, write_us) if own_us is None else own_us) + group.worst_extra_us
+
+    def _answer(self, kind: str, size: Number, group: Group) -> tuple[BusEvent, ...]:
+        turn_us = self._turn_us + self._execution_us(kind, group)
+        return (
+            BusEvent("turn", "cycle_turn_us", turn_us, "turn-around", transaction=kind),
+            BusEvent("answer", "cycle_answer_us", self._wire_us(size), "answer", transaction=kind),
+        )
+
+    def _around(self, kind: str, *inner: BusEvent, is_answered: bool) -> tuple[BusEvent, ...]:
+        """A request with the idle times before and after it, and the adapter."""
+        adapter_us = self.network.profile.bus.adapter_us if is_answered else 0.0
+        after_us = self._times.after if is_answered else self._times.silent
+        return (
+            BusEvent("gap", "cycle_gap_us", self._times.before, "idle time before a request", transaction=kind),
+            *inner,
+            BusEvent("gap", "cycle_gap_us", after_us, "idle time", transaction=kind),
+            BusEvent("adapter", "cycle_adapter_us", adapter_us, "adapter", transaction=kind, rests_on="bus.adapter_us"),
+        )
+
+    def _single(self, kind: Literal["exchange", "read", "write"], place: int, group: Group) -> Run:
+        """A request for each node."""
+        protocol, rounds = self._protocol, group.nodes
+        if kind == "exchange":
+            request: Number = protocol.exchange_request_bytes + group.write_bytes
+            answer: Number = protocol.exchange_answer_bytes + group.read_bytes
+        elif kind == "read":
+            request, answer = protocol.read_request_bytes, protocol.read_answer_bytes + self._data(kind, group)
+            rounds = rounds * self._times_a_cycle(kind)
+        else:
+            request, answer = protocol.write_request_bytes + self._data(kind, group), protocol.write_answer_bytes
+            rounds = rounds * self._times_a_cycle(kind)
+        sent = BusEvent("request", "cycle_request_us", self._wire_us(request), f"{kind} request", transaction=kind)
+        answers = () if is_everywhere(answer <= 0) else self._answer(kind, answer, group)
+        return Run(self._around(kind, sent, *answers, is_answered=bool(answers)), rounds, place)
+
+    def _sync(self, kind: TransactionKind, place: int, group: Group) -> Iterator[Run]:
+        """One request for all nodes of a group: all answer in turn to a read, none to a write."""
+        protocol, data = self._protocol, self._data(kind, group)
+        size: Number = protocol.sync_read_bytes if kind == "read" else protocol.sync_write_bytes
+        size = size + group.nodes * (protocol.sync_node_bytes + (0 if kind == "read" else data))
+        sent = BusEvent("request", "cycle_request_us", self._wire_us(size), f"sync {kind}", transaction=kind)
+        before, request, *after = self._around(kind, sent, is_answered=kind == "read")
+        rounds = self._times_a_cycle(kind)
+        if kind == "write":
+            yield Run((before, request, *after), rounds)
+            return
+        yield Run((before, request), rounds)
+        answer = self._answer(kind, protocol.read_answer_bytes + data, group)
+        yield Run(answer, group.nodes * rounds, place)
+        yield Run(tuple(after), rounds)
+
+    def _answers(self, group: Group, kind: str) -> Number:
+        """Answers of a group's nodes to requests of a kind in a cycle [1]."""
+        if self.way == "exchange":
+            return group.nodes if kind == "read" else 0
+        if kind == "read":
+            return group.nodes * self._times_a_cycle("read")
+        is_answered = self.way == "single" and not is_everywhere(self._protocol.write_answer_bytes <= 0)
+        return group.nodes * self._times_a_cycle("write") if is_answered else 0
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Turn-around, of all nodes together; the adapter; and the nodes' own time."""
+        groups, between = self.network.groups, self._times
+        answers = total(self._answers(group, kind) for group in groups for kind in TRANSACTION_KINDS)
+        half_us = 0.0 if self.is_typical else (between.longest_turn - between.typical_turn) / 2
+        doubts = [
+            Doubt("bus.max_turn_bits", "turn-around of a node", answers * half_us / 2),
+            Doubt("bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * ADAPTER_SHARE),
+        ]
+        if self.network.profile.bus.protocol not in BUFFERED:
+            for group in groups:
+                reads, writes = self._answers(group, "read"), self._answers(group, "write")
+                us = reads * group.read_uncertainty_us + writes * group.write_uncertainty_us
+                if self.way == "exchange":
+                    us = reads * larger(group.read_uncertainty_us, group.write_uncertainty_us)
+                label = f"execution time of {group.name}" if group.name else "execution time"
+                doubts.append(Doubt(group.key("execution"), label, us))
+        return tuple(doubts)
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """The host's own time and its adapter."""
+        bus = self.network.profile.bus
+        parts = (
+            (bus.host_us, LeftOut("host time", "bus.host_us")),
+            (bus.adapter_us or bus.protocol in BUFFERED, LeftOut("the host's adapter", "bus.adapter_us")),
+        )
+        return tuple(left_out for given, left_out in parts if not given)
+
+    def premises(self) -> tuple[str, ...]:
+        """What no key gives."""
+        if self.network.profile.bus.protocol == "dynamixel-2":
+            return ("no byte of the data is stuffed (at most one in three would be)",)
+        return ()
+
+    def figures(self) -> Mapping[str, Number | None]:
+        """The bit rate."""
+        return {RATE.key: self.network.profile.bus.bit_rate_kbit_s}
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """In an exchange the command goes before the feedback: it rests on that of the cycle before."""
+        return int(at_sync) + int(self.way == "exchange")

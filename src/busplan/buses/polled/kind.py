@@ -1,0 +1,223 @@
+"""Polled buses, as a kind of bus."""
+
+from collections.abc import Mapping
+from functools import reduce
+from typing import ClassVar, Final
+
+from busplan.buses.bus import Bus
+from busplan.buses.limits import (
+    NODE_LIMIT,
+    Cost,
+    Key,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    Starter,
+    TimingModel,
+)
+from busplan.buses.network import Network
+from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
+from busplan.buses.polled.protocols import BUFFERED, CONSTANTS, protocol_of
+from busplan.elementwise import Number, larger, plain
+
+_RATES_KBIT_S: Final = {
+    "profibus-dp": (9.6, 19.2, 45.45, 93.75, 187.5, 500, 1500, 3000, 6000, 12_000),
+    "modbus-rtu": (9.6, 19.2, 38.4, 57.6, 115.2),
+    "dynamixel-2": (9.6, 57.6, 115.2, 1000, 2000, 3000, 4000, 4500),
+    "feetech": (38.4, 57.6, 76.8, 115.2, 128, 250, 500, 1000),
+    "worldfip": (31.25, 1000, 2500, 5000),
+}
+"""Usual bit rates of each protocol, for plans."""
+
+
+def _largest_bytes(network: Network) -> Number:
+    """The most data of a telegram for one node [bytes]."""
+    bus = network.profile.bus
+    return reduce(
+        larger,
+        (
+            larger(group.read_bytes / bus.reads, group.write_bytes / bus.writes)
+            if PolledCycle(network, STANDARD).way != "exchange"
+            else larger(group.read_bytes, group.write_bytes)
+            for group in network.groups
+        ),
+    )
+
+
+LIMITS: Final = (
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} nodes are over the {most:.0f} of a bus",
+        lambda network: network.nodes,
+        lambda network: protocol_of(network.profile.bus).most_nodes,
+        way_out="a second bus has room for more",
+    ),
+    Limit(
+        "payload",
+        "a telegram has {value:.0f} bytes of data, over {most:.0f}",
+        _largest_bytes,
+        lambda network: protocol_of(network.profile.bus).most_bytes,
+        way_out="a smaller payload would do",
+    ),
+    Limit(
+        "range",
+        "{value:g} kbit/s are over the {most:g} of the protocol",
+        lambda network: network.profile.bus.bit_rate_kbit_s,
+        lambda network: protocol_of(network.profile.bus).most_kbit_s,
+        way_out="a lower bit rate would do",
+    ),
+)
+
+
+def _section(protocol: str, rate: str, *more: str) -> str:
+    return "\n".join(
+        ("[bus]", 'kind = "polled"', f'protocol = "{protocol}"', f"bit_rate_kbit_s = {rate}   # assumed", *more)
+    )
+
+
+_SERVO: Final = (
+    "return_delay_us = 0        # assumed: set it in every servo; a new one has 500",
+    "adapter_us = 1000          # assumed: latency timer of a USB adapter, 1 to 16 ms; measure it",
+)
+_PROFIBUS: Final = _section("profibus-dp", "12000", "global_control = true      # assumed: isochronous drives")
+_SECTIONS: Final = {
+    "profibus": _PROFIBUS,
+    "modbus": _section("modbus-rtu", "115.2", "adapter_us = 1000          # assumed: measure it"),
+    "dynamixel": _section("dynamixel-2", "1000", *_SERVO),
+    "feetech": _section("feetech", "1000", *_SERVO),
+    "worldfip": _section("worldfip", "2500"),
+}
+
+
+_TITLES: Final = {
+    "profibus-dp": "PROFIBUS DP",
+    "modbus-rtu": "Modbus RTU",
+    "dynamixel-2": "Dynamixel 2",
+    "feetech": "Feetech",
+    "worldfip": "WorldFIP",
+}
+
+
+class Polled(Bus):
+    """Serial buses whose master asks its nodes one by one: PROFIBUS, Modbus, serial servos, WorldFIP."""
+
+    kind = "polled"
+    title = "polled bus"
+    also_called = (
+        "PROFIBUS",
+        "PROFIBUS DP",
+        "Modbus",
+        "Modbus RTU",
+        "Dynamixel",
+        "Dynamixel 2",
+        "Feetech",
+        "WorldFIP",
+        "FIP",
+    )
+    timing_models = (
+        TimingModel(STANDARD, "answers midway between typical and longest; U reaches to both"),
+        TimingModel(TYPICAL, "answers as typical nodes give them, as vendors' rules count"),
+    )
+    deciding_model = STANDARD
+    figures = FIGURES
+    limits = LIMITS
+    starter = Starter(
+        _PROFIBUS,
+        variants=_SECTIONS,
+        period="10ms",
+        measure="from the end of a request to the answer, less bus.return_delay_us",
+        base="what a node takes before it answers",
+    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
+    rate_keys = ("bus.bit_rate_kbit_s",)
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.protocol": Key(chooses=True),
+        "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.bit_rate_kbit_s": Key("f", meaning="in every node", short="{} kbit/s"),
+        "bus.requests": Key(chooses=True, meaning="if the host's software can"),
+        "bus.return_delay_us": Key("t_delay", meaning="in every node"),
+        "bus.adapter_us": Key("t_adapter", grade="assumed"),
+        "bus.host_us": Key("t_host", role="host"),
+        "node.execution.worst_extra_us": Key("T_extra"),
+    }
+    evidence_data = ("polled",)
+
+    def title_of(self, network: Network) -> str:
+        """Name of the protocol; of one of the user's own, that of the kind."""
+        protocol = network.profile.bus.protocol
+        return _TITLES.get(protocol, self.title) if isinstance(protocol, str) else self.title
+
+    def cycle(self, network: Network, *, model: str) -> PolledCycle:
+        """The cycle of a network under a timing model."""
+        return PolledCycle(network, model)
+
+    def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - as the cycle
+        """Nodes that answer from a buffer execute beside the telegrams."""
+        return network.profile.bus.protocol not in BUFFERED
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:
+        """The return delay, another bit rate, and another way to ask."""
+        bus, protocol = network.profile.bus, protocol_of(network.profile.bus)
+        rates = _RATES_KBIT_S.get(bus.protocol, ()) if isinstance(bus.protocol, str) else ()
+        delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
+        way = PolledCycle(network, STANDARD).way
+        parts: tuple[tuple[str, str, Cost, str, tuple[int | float | str, ...], str], ...] = (
+            (
+                "return_delay",
+                "return delay",
+                Cost.REGISTER,
+                "bus.return_delay_us",
+                (0.0,) if delay_us else (),
+                "it is 0",
+            ),
+            (
+                "bit_rate",
+                "bit rate",
+                Cost.REGISTER,
+                "bus.bit_rate_kbit_s",
+                tuple(float(rate) for rate in rates if rate > bus.bit_rate_kbit_s),
+                "no higher one is usual",
+            ),
+            (
+                "requests",
+                "way to ask",
+                Cost.SCHEDULE,
+                "bus.requests",
+                tuple(better for better in protocol.requests[: protocol.requests.index(way)][::-1]),
+                "the protocol has no faster one",
+            ),
+        )
+        return tuple(
+            Setting(name, label, cost, (key,), tuple({key: value} for value in values), "" if values else reason)
+            for name, label, cost, key, values, reason in parts
+        )
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """A slower adapter, and one request more that is repeated."""
+        bus = network.profile.bus
+        no_timeout = (
+            "" if bus.protocol == "profibus-dp" or bus.timeout_us is not None else "bus.timeout_us is not given"
+        )
+        return (
+            Perturbation("adapter +100 us", {"bus.adapter_us": bus.adapter_us + 100}),
+            Perturbation("one retry more", {"bus.retries": bus.retries + 1}, why_not=no_timeout),
+        )
+
+    def payloads(self, network: Network) -> PayloadRange:
+        """Payloads of whole bytes that a telegram holds."""
+        return PayloadRange(1, int(protocol_of(network.profile.bus).most_bytes), carrier="a telegram")
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:
+        """Protocol, bit rate, and how nodes are asked."""
+        bus, way = network.profile.bus, PolledCycle(network, STANDARD).way
+        name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
+        asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]
+        adapter = (f"adapter {bus.adapter_us:g} us a request (assumed until measured)",) if bus.adapter_us else ()
+        return (name, f"{plain(bus.bit_rate_kbit_s):g} kbit/s", asked, *adapter)
+
+
+BUS: Final = Polled()

@@ -1,0 +1,109 @@
+"""The keys that only profiles of polled buses have, in [bus]."""
+
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from busplan.buses.polled.cycle import STANDARD, TimingModelName
+from busplan.buses.polled.protocols import BitTimes, Protocol, ProtocolName, Requests, protocol_of
+from busplan.sections.base import Count, Problem, TimeUs, refused
+from busplan.sections.cycle import BusSection
+from busplan.sections.profile import Profile
+
+
+class PolledBus(BusSection):
+    """Section [bus]: a serial bus whose master asks its nodes one by one."""
+
+    kind: Literal["polled"] = Field(description="Kind of bus", examples=["polled"])
+    protocol: Annotated[
+        Annotated[ProtocolName, Tag("(a name)")] | Annotated[Protocol, Tag("(a table)")],
+        Discriminator(lambda value: "(a table)" if isinstance(value, dict | Protocol) else "(a name)"),
+    ] = Field(
+        description="Protocol: profibus-dp, modbus-rtu, dynamixel-2, feetech or worldfip, or a table [bus.protocol] "
+        "of your own",
+        examples=["dynamixel-2"],
+    )
+    bit_rate_kbit_s: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = Field(
+        description="Bit rate [kbit/s]", examples=[1000]
+    )
+    nodes: Count | None = Field(default=None, description="Nodes N, master not counted", examples=[14])
+    requests: Requests | None = Field(
+        default=None,
+        description="How nodes are asked: exchange (one request writes and reads a node), sync (one request for all "
+        "nodes of a group) or single (a request for each node and direction). Without it the first of these that the "
+        "protocol has",
+        examples=["sync"],
+    )
+    reads: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=1, description="Requests that the data read from a node are split over", examples=[3]
+    )
+    writes: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=1, description="Requests that the data written to a node are split over", examples=[1]
+    )
+    return_delay_us: TimeUs | None = Field(
+        default=None,
+        description="Delay of an answer that is set in the nodes, not a part of node.execution. Without it that of a "
+        "new node [us]",
+        examples=[0],
+    )
+    max_turn_bits: BitTimes | None = Field(
+        default=None,
+        description="Longest wait for an answer, as max T_SDR of the slowest slave's GSD. Without it the protocol's "
+        "[bits]",
+        examples=[100],
+    )
+    adapter_us: TimeUs = Field(
+        default=0.0,
+        description="Time that the host's adapter adds to each request with answers, as the latency timer of a USB "
+        "adapter [us]",
+        examples=[1000],
+    )
+    host_us: TimeUs = Field(
+        default=0.0, description="The host's own time in a cycle, between feedback and commands [us]", examples=[200]
+    )
+    global_control: bool = Field(
+        default=False,
+        description="Whether a broadcast opens the cycle, as Global Control of isochronous PROFIBUS",
+        examples=[True],
+    )
+    retries: Annotated[int, Field(ge=0, le=1000)] = Field(
+        default=0, description="Requests of a cycle that get no answer and are repeated", examples=[1]
+    )
+    timeout_us: TimeUs | None = Field(
+        default=None,
+        description="How long the master waits for an answer that does not come; of PROFIBUS without it T_SL [us]",
+        examples=[2000],
+    )
+    timing_model: TimingModelName = Field(
+        default=STANDARD,
+        description="Timing model whose figures lead the tables, standard or typical; the verdict is always by "
+        "standard",
+        examples=[STANDARD],
+    )
+
+    @model_validator(mode="after")
+    def _is_of_its_protocol(self) -> Self:
+        protocol, problems = protocol_of(self), []
+        ways = protocol.requests
+        if not ways:
+            problems.append(Problem("has no request that reads a node; give read_request_bytes", "protocol"))
+        elif self.requests is not None and self.requests not in ways:
+            problems.append(Problem(f"the protocol has none of these; it has {', '.join(ways)}", "requests"))
+        if self.global_control and not protocol.global_bytes:
+            problems.append(Problem("the protocol has no broadcast that opens a cycle", "global_control"))
+        if self.retries and self.timeout_us is None and self.protocol != "profibus-dp":
+            problems.append(Problem("a repeated request waits for a timeout; give bus.timeout_us", "retries"))
+        if self.return_delay_us is not None and self.protocol == "profibus-dp":
+            problems.append(Problem("PROFIBUS has no return delay; give max_turn_bits", "return_delay_us"))
+        if problems:
+            raise refused(*problems)
+        return self
+
+
+class PolledProfile(Profile):
+    """A whole profile: one motion network and its cycle."""
+
+    bus: PolledBus = Field(description="The bus")
+
+
+PROFILE: Final = PolledProfile

@@ -1,0 +1,338 @@
+"""Polled buses beside an event simulation, published figures, and what a user may get wrong."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+import busplan
+from busplan import BusplanError, Profile
+from busplan.buses.polled.cycle import PolledCycle
+from busplan.cli import app
+from busplan.questions.fit.network import network_of
+from tests.oracles.polled_simulation import DYNAMIXEL, FEETECH, RATIOS, modbus_us, profibus_us, servos_us
+
+OWN = """\
+schema_version = 1
+name = "own"
+[bus]
+kind = "polled"
+bit_rate_kbit_s = 500
+nodes = 5
+[bus.protocol]
+bits_per_byte = 10
+read_request_bytes = 6
+read_answer_bytes = 5
+write_request_bytes = 6
+[cycle]
+period_us = 10000
+[payload]
+read_bytes = 4
+write_bytes = 4
+[node]
+axes = 1
+[node.execution]
+kind = "linear"
+grade = "measured"
+base_us = 100
+per_byte_us = 0
+"""
+
+
+def changed(name: str, **changes: Any) -> Profile:
+    """A shipped profile with other values by dotted key, __ for the dot."""
+    return busplan.load_profile(name, changes={key.replace("__", "."): value for key, value in changes.items()})
+
+
+def required_us(profile: Profile | Path, model: str = "standard") -> float:
+    (result,) = busplan.capacity(profile, timing_model=[model]).results
+    return float(result.required_us)
+
+
+def servo(**changes: Any) -> Profile:
+    return changed("dynamixel-arm-14", **changes)
+
+
+drives = st.lists(st.tuples(st.integers(1, 244), st.integers(1, 244)), min_size=1, max_size=6)
+
+
+@given(
+    st.sampled_from(sorted(RATIOS)),
+    st.integers(1, 20),
+    st.integers(1, 244),
+    st.integers(1, 244),
+    st.booleans(),
+    st.data(),
+)
+def test_profibus_lies_between_its_ends_and_the_ends_are_simulated(
+    rate: float, nodes: int, read: int, write: int, is_isochronous: bool, data: st.DataObject
+) -> None:
+    profile = changed(
+        "profibus-drives-6",
+        bus__bit_rate_kbit_s=float(rate),
+        bus__nodes=nodes,
+        bus__global_control=is_isochronous,
+        payload__read_bytes=read,
+        payload__write_bytes=write,
+        cycle__nonperiodic_us=0.0,
+        cycle__period_us=1e6,
+    )
+
+    def simulated(sdr: int | None) -> float:
+        def wait() -> Fraction:
+            return Fraction(data.draw(st.integers(32, RATIOS[rate][0])) if sdr is None else sdr)
+
+        return profibus_us(rate, [(write, read)] * nodes, sdr=wait, is_isochronous=is_isochronous)
+
+    (result,) = busplan.capacity(profile, timing_model=["standard"]).results
+    middle_us, u_us = result.required_us, float(result.uncertainty_us or 0)
+    assert required_us(profile, "typical") == pytest.approx(simulated(32), rel=1e-9)
+    assert middle_us - u_us == pytest.approx(simulated(32), rel=1e-9)
+    assert middle_us + u_us == pytest.approx(simulated(RATIOS[rate][0]), rel=1e-9)
+    assert middle_us - u_us - 1e-6 <= simulated(None) <= middle_us + u_us + 1e-6
+
+
+@given(
+    st.sampled_from(["dynamixel-2", "feetech"]),
+    st.sampled_from([57.6, 115.2, 1000.0]),
+    st.integers(1, 40),
+    st.integers(1, 60),
+    st.integers(1, 60),
+    st.integers(1, 4),
+    st.booleans(),
+    st.sampled_from([0.0, 250.0, 500.0]),
+    st.sampled_from([0.0, 1000.0, 16000.0]),
+)
+def test_servos_are_those_of_the_simulation(
+    protocol: str,
+    rate: float,
+    nodes: int,
+    read: int,
+    write: int,
+    reads: int,
+    is_sync: bool,
+    delay_us: float,
+    adapter_us: float,
+) -> None:
+    profile = servo(
+        bus__protocol=protocol,
+        bus__bit_rate_kbit_s=rate,
+        bus__nodes=nodes,
+        bus__reads=reads,
+        bus__requests="sync" if is_sync else "single",
+        bus__return_delay_us=delay_us,
+        bus__adapter_us=adapter_us,
+        payload__read_bytes=read,
+        payload__write_bytes=write,
+    )
+    simulated_us = servos_us(
+        FEETECH if protocol == "feetech" else DYNAMIXEL,
+        rate,
+        nodes,
+        read=read,
+        write=write,
+        reads=reads,
+        is_sync=is_sync,
+        turn_us=delay_us + 50,
+        adapter_us=adapter_us,
+    )
+    assert required_us(profile) == pytest.approx(simulated_us, rel=1e-9)
+
+
+@pytest.mark.parametrize("rate", [9.6, 19.2, 38.4, 115.2])
+@pytest.mark.parametrize("way", ["exchange", "single"])
+def test_modbus_is_that_of_the_simulation(rate: float, way: str) -> None:
+    profile = servo(
+        bus__protocol="modbus-rtu", bus__bit_rate_kbit_s=rate, bus__requests=way, bus__adapter_us=0.0, bus__nodes=3
+    )
+    simulated_us = modbus_us(rate, 3, read=10, write=4, node_us=50, is_exchange=way == "exchange")
+    assert required_us(profile) == pytest.approx(simulated_us, rel=1e-9)
+
+
+def test_worldfip_by_hand() -> None:
+    # 8 bits a byte at 1 Mbit/s: ID_DAT 8 bytes and RP_DAT 9 and its data, a turn-around of 10 to 70 bits behind each.
+    profile = servo(
+        bus__protocol="worldfip", bus__requests="single", bus__nodes=1, bus__adapter_us=0.0, bus__return_delay_us=0.0
+    )
+    read_us = (8 + 9 + 10) * 8 + (10 + 70) / 2 + 70
+    write_us = (8 + 9 + 4) * 8 + 2 * 70
+    assert required_us(profile) == read_us + write_us
+
+
+def test_the_manual_of_profibus_has_its_own_sum() -> None:
+    # 20 slaves, 80 bytes, 1.5 Mbit/s: (33 + 33 + 150) + (33 + 66 + 300) + 20 (33 + 2 * 99 + 4 * 11 + 32 + 37) bits
+    profile = changed(
+        "profibus-drives-6",
+        bus__nodes=20,
+        bus__bit_rate_kbit_s=1500.0,
+        bus__global_control=False,
+        payload__read_bytes=2,
+        payload__write_bytes=2,
+        cycle__nonperiodic_us=0.0,
+    )
+    assert required_us(profile, "typical") == pytest.approx(7495 / 1.5)
+    assert required_us(profile, "typical") == pytest.approx(4917, rel=0.1)
+
+
+def test_the_published_rates_of_14_servos_are_met() -> None:
+    assert 120 <= 1e6 / required_us(servo()) <= 180
+    assert 60 <= 1e6 / required_us(servo(bus__reads=3)) <= 80
+    (kind,) = busplan.evidence("polled").kinds
+    assert [len(section.comparisons) for section in kind.sections] == [4, 1]
+
+
+@pytest.mark.parametrize(
+    ("period_us", "verdict"),
+    [(1153.0, "fits"), (1152.0, "not shown to fit"), (769.0, "not shown to fit"), (768.0, "does not fit")],
+)
+def test_between_the_ends_nothing_is_shown(period_us: float, verdict: str) -> None:
+    (result,) = busplan.capacity(
+        changed("profibus-drives-6", cycle__period_us=period_us), timing_model=["standard"]
+    ).results
+    assert result.verdict == verdict
+
+
+def test_a_retry_is_a_request_and_a_timeout() -> None:
+    more_us = required_us(changed("profibus-drives-6", bus__retries=2)) - required_us(changed("profibus-drives-6"))
+    assert more_us == pytest.approx(2 * (33 + (9 + 10) * 11 + 1000) / 12)
+    more_us = required_us(servo(bus__retries=1, bus__timeout_us=3000.0)) - required_us(servo())
+    assert more_us == pytest.approx((14 + 14) * 10 + 3000)
+
+
+def test_a_slave_with_a_shorter_delay_of_its_own() -> None:
+    (result,) = busplan.capacity(
+        changed("profibus-drives-6", bus__max_turn_bits=100.0), timing_model=["standard"]
+    ).results
+    assert result.uncertainty_us == pytest.approx(6 * (100 - 32) / 2 / 12)
+
+
+def test_groups_have_a_sync_read_each(tmp_path: Path) -> None:
+    text = OWN.replace("nodes = 5\n", "").replace(
+        "write_request_bytes = 6",
+        "write_request_bytes = 6\nsync_read_bytes = 8\nsync_write_bytes = 8\nsync_node_bytes = 1",
+    )
+    head = text[: text.index("[payload]")]
+    group = (
+        '[[group]]\nname = "{}"\nnodes = {}\naxes = 1\nread_bytes = {}\nwrite_bytes = 4\n'
+        'execution = {{kind = "linear", grade = "measured", base_us = 100, per_byte_us = 0}}\n'
+    )
+    path = tmp_path / "groups.toml"
+    path.write_text(head + group.format("arm", 3, 4) + group.format("hand", 2, 8), encoding="utf-8")
+    arm = (8 + 3) * 20 + 3 * (100 + (5 + 4) * 20) + (8 + 3 * 5) * 20
+    hand = (8 + 2) * 20 + 2 * (100 + (5 + 8) * 20) + (8 + 2 * 5) * 20
+    assert required_us(path) == arm + hand
+
+
+def test_a_protocol_of_the_users_own(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(OWN, encoding="utf-8")
+    by_hand_us = 5 * (6 * 20 + 100 + (5 + 4) * 20) + 5 * (6 + 4) * 20
+    assert required_us(path) == by_hand_us
+    (derivation,) = busplan.explain(path, "required_us", timing_model="standard").derivations
+    assert derivation.value == by_hand_us
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "read_request_bytes = 6\n",
+            "read_requst_bytes = 6\n",
+            "bus.protocol.read_requst_bytes: unknown key; did you mean read_request_bytes?",
+        ),
+        ("bits_per_byte = 10", "bits_per_byte = 100", "bus.protocol.bits_per_byte = 100: must be 12 or less"),
+        ("read_request_bytes = 6\n", "", "has no request that reads a node"),
+    ],
+)
+def test_a_wrong_protocol_says_where(tmp_path: Path, old: str, new: str, words: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(OWN.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(BusplanError) as refused:
+        busplan.load_profile(path)
+    assert words in str(refused.value)
+    assert "(a " not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"bus.protocol": "profinet"}, 'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech" or "worldfip"'),
+        ({"bus.requests": "exchange"}, "it has sync, single"),
+        ({"bus.retries": 1}, "give bus.timeout_us"),
+        ({"bus.global_control": True}, "no broadcast that opens a cycle"),
+    ],
+)
+def test_what_a_protocol_cannot_do_is_refused(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(BusplanError, match=words):
+        busplan.load_profile("dynamixel-arm-14", changes=changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "limit"),
+    [
+        ({"bus.nodes": 254}, "nodes"),
+        ({"bus.bit_rate_kbit_s": 5000.0}, "range"),
+        ({"bus.protocol": "feetech", "payload.read_bytes": 250}, "payload"),
+    ],
+)
+def test_limits_of_a_protocol(changes: dict[str, Any], limit: str) -> None:
+    profile = busplan.load_profile("dynamixel-arm-14", changes={**changes, "cycle.period_us": 1e6})
+    (result,) = busplan.capacity(profile, timing_model=["standard"]).results
+    assert result.exceeded == (limit,)
+
+
+def test_a_plan_asks_all_at_once_and_sets_the_return_delay(tmp_path: Path) -> None:
+    text = Path("profiles/dynamixel-arm-14.toml").read_text(encoding="utf-8")
+    path = tmp_path / "slow.toml"
+    text = text.replace('requests = "sync"', 'requests = "single"').replace(
+        "return_delay_us = 0 ", "return_delay_us = 500 "
+    )
+    path.write_text(text.replace("period_us = 10000", "period_us = 8000"), encoding="utf-8")
+    plan = busplan.plan(path, free=["return_delay", "requests"])
+    assert plan.recommended is not None
+    assert dict(plan.recommended.changes) == {"bus.requests": "sync", "bus.return_delay_us": 0.0}
+
+
+def test_a_command_of_an_exchange_rests_on_the_cycle_before() -> None:
+    drives_of = PolledCycle(network_of(changed("profibus-drives-6")), "standard")
+    arm = PolledCycle(network_of(servo()), "standard")
+    assert [drives_of.loop_periods(at_sync=sync) for sync in (False, True)] == [1, 2]
+    assert [arm.loop_periods(at_sync=sync) for sync in (False, True)] == [0, 1]
+    # Node 1 has its command with the request; all servos have theirs with the sync write at the end.
+    assert drives_of.arrival_us(1) == pytest.approx(163.75 + 976 / 12 + (33 + 209) / 12)
+    assert arm.arrival_us(1) == arm.arrival_us(14) == pytest.approx(6760)
+
+
+@pytest.mark.parametrize(
+    ("word", "protocol"),
+    [
+        ("profibus", "profibus-dp"),
+        ("PROFIBUS DP", "profibus-dp"),
+        ("modbus", "modbus-rtu"),
+        ("Dynamixel 2", "dynamixel-2"),
+        ("feetech", "feetech"),
+        ("worldfip", "worldfip"),
+        ("polled", "profibus-dp"),
+    ],
+)
+def test_a_new_profile_is_of_the_bus_that_is_asked_for(word: str, protocol: str, tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    done = CliRunner().invoke(app, ["init", str(path), "--bus", word, "--nodes", "6", "--axes", "6"])
+    assert done.exit_code == 0, done.output
+    assert busplan.load_profile(path).bus.protocol == protocol
+
+
+def test_a_sweep_is_its_points() -> None:
+    answer = busplan.sweep(
+        "profibus-drives-6",
+        vary={"bus.bit_rate_kbit_s": [187.5, 1500.0, 12000.0], "bus.retries": [0, 2]},
+        timing_model=["standard"],
+    )
+    columns = (answer[name] for name in ("bus.bit_rate_kbit_s", "bus.retries", "required_us"))
+    for rate, retries, us in zip(*columns, strict=True):
+        profile = changed("profibus-drives-6", bus__bit_rate_kbit_s=float(rate), bus__retries=int(retries))
+        assert us == pytest.approx(required_us(profile), rel=1e-12)
