@@ -127,7 +127,7 @@ def check(
     >>> import busplan
     >>> answer = busplan.check(["paper-4ms", "paper-dma"])
     >>> answer.passed, answer.summary
-    (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0, suppressed=0))
+    (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0, suppressed=3))
     """
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
     recorded = None if baseline is None else _recorded(baseline)

