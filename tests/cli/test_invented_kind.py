@@ -453,7 +453,12 @@ def test_its_safe_stations_are_those_that_a_count_finds(doubted: Path, period_us
         (
             "nodes = 5",
             "nodes = 5\ngap_count = 5",
-            "ring.toml:7:1: bus.gap_count: unknown key; known here: kind, nodes, rate_mbit_s, token_us, timing_model",
+            'ring.toml:7:1: bus.gap_count: unknown key on this bus; it is a key where bus.kind is "ieee1394"',
+        ),
+        (
+            "nodes = 5",
+            "nodes = 5\nflags = 5",
+            "ring.toml:7:1: bus.flags: unknown key; known here: kind, nodes, rate_mbit_s, token_us, timing_model",
         ),
         ("nodes = 5", "nodes = 5\nrate_mbit_s = 0", "ring.toml:7:1: bus.rate_mbit_s = 0: must be greater than 0"),
         ("[servo]", "[gard]\n[servo]", "ring.toml:24:2: gard: unknown key; did you mean guard?"),

@@ -79,6 +79,9 @@ def test_a_unit_of_another_quantity_is_refused() -> None:
         ("bus.nods=3", "unknown key; did you mean nodes?"),
         ("bus.gap_count=5us", "expected a whole number from 0 to 63"),
         ("node.execution.base_us=3", 'unknown key where kind is "table"; it is a key of kind = "linear"'),
+        ("bus.bit_rate_kbit_s=500", 'unknown key on this bus; it is a key where bus.kind is "can" or "polled"'),
+        ("bus.sync_shift=0.8", 'unknown key on this bus; it is a key where bus.kind is "ethercat"'),
+        ("bus.pipelines=0", "unknown key; known here: kind, speed"),
     ],
 )
 def test_a_key_that_is_not_there_is_told_where_it_is(text: str, words: str) -> None:

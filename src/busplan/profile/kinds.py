@@ -219,9 +219,9 @@ def profile_model(kind: str | None) -> type[Profile]:
     return Profile if kind is None else kind_named(kind).profile_model()
 
 
-def is_of_a_kind(path: tuple[int | str, ...]) -> bool:
-    """Whether any kind of bus has a key; then it may be valid once the kind is known."""
-    return any(True for kind in kind_names() for _ in _fields(profile_model(kind), path))
+def kinds_with(path: tuple[int | str, ...]) -> list[str]:
+    """Kinds of bus whose profiles have a key."""
+    return [kind for kind in kind_names() if any(True for _ in _fields(profile_model(kind), path))]
 
 
 def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[FieldInfo]:

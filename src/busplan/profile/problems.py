@@ -9,11 +9,11 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from busplan.buses import kind_names
-from busplan.english import printable
+from busplan.english import listed, printable
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import Document
 from busplan.profile.edit import value_text
-from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, named_path, path_of, profile_model, value_keys
+from busplan.profile.kinds import kind_of, kinds_with, models_of, named_path, path_of, profile_model, value_keys
 from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
@@ -118,7 +118,7 @@ def _validated(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFind
         elif details["type"] == "missing":
             yield KeyFinding(path, _missing(path, section), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
-            if kind_of(data) is not None or not is_of_a_kind(path):
+            if kind_of(data) is not None or not kinds_with(path):
                 yield KeyFinding(path, _unknown(path, section, model), "unknown-key", shows_value=False)
         elif details["type"] == "union_tag_not_found":
             tags = [f"{_TAG} = {tag}" for tag in _tags(path, section)]
@@ -216,6 +216,9 @@ def _unknown(path: KeyPath, section: type[BaseModel], model: type[BaseModel]) ->
         if name in table.model_fields:
             own = _word_of_kind(section)
             return f'unknown key where kind is "{own}"; it is a key of kind = "{kind}"'
+    if kinds := kinds_with(path):
+        words = listed([value_text(kind) for kind in kinds], "or")
+        return f"unknown key on this bus; it is a key where bus.kind is {words}"
     parts_of_keys = [key.split(".") for key in value_keys(model, {})]
     elsewhere = [
         ".".join(parts[: number + 1])

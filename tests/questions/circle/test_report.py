@@ -79,6 +79,18 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     assert busplan.check("ethercat-servo-8").passed
     ideal = busplan.circle_test("dvrk")
     assert "largest contour error below 0.1 um" in texts(ideal)[0]
+    # Without a tolerance G of a whole turn says it, though chords leave the largest error over 0.1 um.
+    changes = {"tolerance": {}, "servo.drive_lag_us": 1000, "circle.feed_mm_per_min": 3000}
+    turn = busplan.circle_test(busplan.load_profile("ethercat-servo-8", changes=changes))
+    (of_turn,) = turn.results
+    assert of_turn.circular_deviation_mm is not None
+    assert of_turn.max_contour_error_mm is not None
+    assert of_turn.circular_deviation_mm < 1e-4 < of_turn.max_contour_error_mm
+    assert (of_turn.passed, of_turn.sources_matter) == (None, False)
+    assert "no error source of this profile matters; circular deviation G below 0.1 um" in texts(turn)[0]
+    # With one of the largest error that error is judged.
+    largest = busplan.load_profile("ethercat-servo-8", changes={**changes, "tolerance": {"max_contour_error_mm": 0.02}})
+    assert (busplan.circle_test(largest).passed, busplan.circle_test(largest).results[0].sources_matter) == (True, True)
     # A tolerance that is broken fails, however small the error.
     tight = busplan.load_profile("ethercat-servo-8", changes={"tolerance.circular_deviation_mm": 1e-10})
     assert busplan.circle_test(tight).passed is False

@@ -158,7 +158,8 @@ CIRCLE_FIGURES: Final = (
         "sources_matter",
         "matter",
         "simulation",
-        "whether any measure with a tolerance, else the largest error, is 0.1 um or more; null if nothing was measured",
+        "whether any measure with a tolerance, else G or a trapezoid's largest error, is 0.1 um or more; null if not "
+        "measured",
     ),
     Figure(
         "passed",
@@ -175,6 +176,15 @@ CIRCLE_FIGURES: Final = (
 )
 CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
 """Figures of the circle test by key."""
+
+
+def telling_measures(profile: Profile) -> tuple[str, ...]:
+    """Keys of the measures that tell how round a circle is.
+
+    Those with a tolerance; without one, G of a whole turn, or the largest contour error of a trapezoid.
+    """
+    whole = "max_contour_error_mm" if profile.circle.path == "trapezoid" else "circular_deviation_mm"
+    return profile.tolerance.judged or (whole,)
 
 
 class Contribution(NamedTuple):
@@ -249,8 +259,8 @@ class CircleFigures(NamedTuple):
     constant_speed_deg: float | None
     """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
     sources_matter: bool | None
-    """Whether a measure with a tolerance, or the largest error if none has one, is 0.1 um or more. If not, no error
-    source of the profile matters, and the test says nothing about a machine. None if nothing was measured."""
+    """Whether one of the `telling_measures` is 0.1 um or more. If not, no error source of the profile matters, and the
+    test says nothing about a machine. None if nothing was measured."""
     passed: bool | None
     """None, not judged, if nothing fails, and the profile has no contour tolerance or no error source matters."""
     failures: "tuple[Failure, ...]"

@@ -28,7 +28,14 @@ from busplan.forms.blocks import (
 from busplan.forms.charts import Drawing, Panel
 from busplan.forms.numbers import period, period_value
 from busplan.questions.base.sentences import FigureColumn, document, figure_table, with_profile
-from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer
+from busplan.questions.circle import (
+    CIRCLE_BY_KEY,
+    JITTER,
+    NEGLIGIBLE_MM,
+    CircleFigures,
+    CircleTestAnswer,
+    telling_measures,
+)
 from busplan.questions.circle.drawing import contour_profile, dial, magnified
 from busplan.questions.circle.failures import MARGINS
 from busplan.sections.profile import Profile
@@ -49,13 +56,13 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
         yield Sentence((*subject, ": ", Words("the circle holds every tolerance", verdict.state), "."), verdict.state)
     elif result.sources_matter is False:
         none = Words("no error source of this profile matters", verdict.state)
-        labels = [CIRCLE_BY_KEY[key].label for key in profile.tolerance.judged or ("max_contour_error_mm",)]
+        labels = [CIRCLE_BY_KEY[key].label for key in telling_measures(profile)]
         least = f"{listed(labels, 'and')} below {NEGLIGIBLE_MM * 1e3:g} um"
         yield Sentence(
             (*subject, ": ", none, f"; {least}, which says nothing of how round a machine is."), verdict.state
         )
     else:
-        yield Sentence((*subject, ": ", *_unjudged(result), "."), verdict.state)
+        yield Sentence((*subject, ": ", *_unjudged(profile, result), "."), verdict.state)
     yield sentence(
         "The loop is stable, with a phase margin of {}{} or more and a gain margin of {}{} or more.",
         *(
@@ -69,9 +76,9 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
     )
 
 
-def _unjudged(result: CircleFigures) -> tuple[Part, ...]:
-    """The measure that needs a tolerance, and its key: G of a whole turn, else the largest contour error."""
-    key = "max_contour_error_mm" if result.circular_deviation_mm is None else "circular_deviation_mm"
+def _unjudged(profile: Profile, result: CircleFigures) -> tuple[Part, ...]:
+    """The measure that needs a tolerance, and its key."""
+    key = telling_measures(profile)[0]
     measure = CIRCLE_BY_KEY[key]
     value = attribute_value(measure, result)
     return f"{measure.label} ", value, "; ", Words("no tolerance set", "warns"), ": ", Code(f"tolerance.{key}")

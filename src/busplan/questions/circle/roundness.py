@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Network
 from busplan.progress import Progress
-from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer, Contribution
+from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer, Contribution, telling_measures
 from busplan.questions.circle.failures import bus_failures, circle_failures, tightest_margins
 from busplan.questions.fit.circle_setup import (
     delivery_of,
@@ -325,8 +325,7 @@ def _figures(network: Network, fit: FitFigures, run: CircleRun | None, *, settle
     delay_x_us, delay_y_us = loop_delays_us(network)
     circle = profile.circle
     setpoints = path_setpoints(network)
-    judged = profile.tolerance.judged
-    measures = [getattr(contour, key) for key in judged or ("max_contour_error_mm",)] if contour else []
+    measures = [getattr(contour, key) for key in telling_measures(profile)] if contour else []
     matter = any(value is None or value >= NEGLIGIBLE_MM for value in measures) if contour else None
     of_circle = () if run is None else circle_failures(profile, run, settled=settled)
     failures = (*bus_failures(network, fit), *of_circle)
@@ -362,7 +361,7 @@ def _figures(network: Network, fit: FitFigures, run: CircleRun | None, *, settle
         centre_offset_mm=long_arc.centre_offset_mm if long_arc else None,
         constant_speed_deg=run.constant_speed_deg if run else None,
         sources_matter=matter,
-        passed=False if failures else True if judged and matter else None,
+        passed=False if failures else True if profile.tolerance.judged and matter else None,
         failures=failures,
         contributions=None,
     )
