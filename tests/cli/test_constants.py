@@ -39,6 +39,7 @@ def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("constants.mailbox_bytes=100", "no constant of IEEE 1394, the bus of this profile"),
         ("constants.arbitration_hold=2", "no constant of this name; did you mean ARBITRATION_HOLD_US?"),
         ("constants.arbitration_hold_us=long", "expected a finite number"),
         ("constants.arbitration_hold_us=nan", "expected a finite number"),
@@ -47,3 +48,12 @@ def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
 def test_what_is_no_constant_is_refused(text: str, words: str) -> None:
     done = run("capacity", "paper-4ms", "--set", text)
     assert (done.returncode, words in done.stderr) == (2, True), done.stderr
+
+
+def test_compare_takes_a_constant_of_any_kind() -> None:
+    options = ("compare", "ethercat-servo-8", "--buses", "ieee1394", "--format", "json")
+    plain, changed = (
+        json.loads(run(*options, *more).stdout)["buses"][0]["required_us"]
+        for more in ((), ("--set", "constants.arbitration_hold_us=2.63"))
+    )
+    assert changed > plain

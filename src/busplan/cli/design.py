@@ -496,7 +496,8 @@ def compare_command(
         from busplan.questions.compare import compare
 
         kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
-        give(compare(load_changed(profile, changes), buses=kinds))
+        # A constant may be one of another kind than the profile's.
+        give(compare(load_changed(profile, changes.of_profile), buses=kinds))
 
 
 def import_command(

@@ -84,7 +84,7 @@ class KeyChanges:
     @property
     def values(self) -> dict[str, object]:
         """New value by dotted key of the profile."""
-        return {change.key: change.value for change in self.entries if change.sections[0] != CONSTANTS}
+        return {change.key: change.value for change in self.of_profile.entries}
 
     @property
     def constants(self) -> tuple[KeyChange, ...]:
@@ -101,6 +101,11 @@ class KeyChanges:
         """The --set options as typed; empty without them."""
         return " and ".join(change.typed for change in self.by_set)
 
+    @property
+    def of_profile(self) -> "KeyChanges":
+        """The changes of keys alone."""
+        return KeyChanges(tuple(change for change in self.entries if change.sections[0] != CONSTANTS))
+
     def without(self, *, key: str) -> "KeyChanges":
         """Leave out the change of a key."""
         return KeyChanges(tuple(change for change in self.entries if change.key != key))
@@ -111,8 +116,15 @@ class KeyChanges:
         Raises
         ------
         BusplanError
-            The profile's schema refuses them; each problem names its option.
+            The profile's schema refuses them; each problem names its option. Or its bus has no such constant.
         """
+        if self.constants:
+            from busplan.buses import kind_named  # noqa: PLC0415 - a kind of bus reads its constants when it is loaded
+
+            bus = kind_named(profile.bus.kind)
+            for change in self.constants:
+                if change.sections[-1].upper() not in bus.constants:
+                    raise BusplanError(f"{change.typed}: no constant of {bus.title}, the bus of this profile")
         from busplan.profile.document import override  # noqa: PLC0415 - loads pydantic, which --help does not need
 
         return override(
