@@ -236,13 +236,6 @@ def test_every_default_is_a_value_that_the_schema_takes() -> None:
 # --- the bus ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("speed", ["S800", "S1600", "S3200"])
-def test_faster_speeds_are_refused_with_the_reason(speed: str) -> None:
-    (message,) = refused(bus__speed=speed)
-    assert message.startswith(f"{speed} arbitrates by BOSS, which has no gaps")
-    assert message.endswith('Expected "S100", "S200" or "S400"')
-
-
 def test_a_chain_has_as_many_hops_as_nodes_and_a_tree_as_many_as_it_says() -> None:
     assert [figures(bus__nodes=nodes)["hops"] for nodes in (1, 5, 62)] == [1, 5, 62]
     assert [figures(bus__nodes=nodes, bus__max_hops=3)["hops"] for nodes in (1, 5, 62)] == [3, 3, 3]

@@ -122,7 +122,7 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def arbitration_us(self) -> Number:
         """Arbitration of a broadcast: an isochronous request waits for no part of the gap count [us]."""
-        if not self._is_isochronous:
+        if not self._is_isochronous or not self.link.has_gaps:
             return self.delays.arbitration_us
         return equations.arbitration_phase_us(
             self.link.hops, hop_us=self.delays.hop_us, gap_count=0, gap_clock_mbit_s=BASE_RATE_MBIT_S
@@ -258,6 +258,8 @@ class BroadcastCycle(CycleWithStarts):
 
     def bias_us(self) -> Number | None:
         """Time of the packets beyond the model, on the mean [us]."""
+        if not self.link.has_gaps:
+            return 0.0
         with_gap_us = self.with_gap * doubts.gap_term_us(self.link.gap_count)
         return self.halves * doubts.residual().mean_us + with_gap_us
 

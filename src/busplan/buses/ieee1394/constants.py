@@ -9,7 +9,7 @@ from typing import Final, Literal
 from busplan.elementwise import Number, from_table, rounded_up
 from busplan.sourced import Constants
 
-Speed = Literal["S100", "S200", "S400"]
+Speed = Literal["S100", "S200", "S400", "S800", "S1600", "S3200"]
 
 CONSTANTS: Final = Constants("busplan.buses.ieee1394")
 """Every constant with a source, by its name here."""
@@ -17,6 +17,11 @@ CONSTANTS: Final = Constants("busplan.buses.ieee1394")
 BASE_RATE_MBIT_S: Final = CONSTANTS["BASE_RATE_MBIT_S"]
 DATA_RATE_MBIT_S: Final = CONSTANTS.by_key("DATA_RATE_MBIT_S")
 """Data rate by speed code, in Mbit/s (which is bit/us)."""
+BETA_SPEEDS: Final = ("S800", "S1600", "S3200")
+"""Speeds of IEEE 1394b, whose arbitration has no gaps and no published time: what is computed is a lower bound."""
+BETA_ARBITRATION_US: Final = CONSTANTS["BETA_ARBITRATION_US"]
+BETA_ACKNOWLEDGE_US: Final = CONSTANTS["BETA_ACKNOWLEDGE_US"]
+BETA_PHY_DELAY_US: Final = CONSTANTS["BETA_PHY_DELAY_US"]
 MAX_NODES: Final = CONSTANTS["MAX_NODES"]
 MAX_HOPS: Final = CONSTANTS["MAX_HOPS"]
 MAX_GAP_COUNT: Final = 63

@@ -16,7 +16,6 @@ from busplan.buses.ieee1394.constants import (
     DATA_RATE_MBIT_S,
     LEAST_ASYNCHRONOUS_US,
     SYNC_PACKET_BYTES,
-    safe_gap_count,
 )
 from busplan.buses.ieee1394.figures import LATENCY, SYNC, TERMS
 from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
@@ -30,6 +29,7 @@ from busplan.buses.ieee1394.transactions import (
     group_hops,
     is_broadcast,
     link_of,
+    safe_gap_count_of,
 )
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
@@ -102,13 +102,13 @@ class CycleWithStarts(BusCycle):
 
     @cached_property
     def cycle_start_us(self) -> Number:
-        """Cost of a cycle start: it destroys idle time already run, and goes at S100 [us]."""
+        """Cost of a cycle start: it destroys idle time already run, and goes at S100, or faster without gaps [us]."""
         delays = self.delays
         data_us = equations.data_phase_us(
-            self.link.hops,
+            delays.link.hops,
             hop_us=delays.hop_us,
             packet_bytes=CYCLE_START_BYTES,
-            data_rate_mbit_s=DATA_RATE_MBIT_S["S100"],
+            data_rate_mbit_s=DATA_RATE_MBIT_S["S100"] if self.link.has_gaps else self.link.data_rate_mbit_s,
         )
         isochronous_us: Number = self.network.profile.bus.isochronous_us
         return delays.gaps.arbitration_reset_us + delays.arbitration_us + data_us + isochronous_us
@@ -189,7 +189,7 @@ class CycleWithStarts(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """Settings of the bus, the latencies and gaps, and the number of nodes by equation (11)."""
-        read, write, safe = self.longest("read"), self.longest("write"), safe_gap_count(self.link.hops)
+        read, write, safe = self.longest("read"), self.longest("write"), safe_gap_count_of(self.network)
         return {
             "hops": self.link.hops,
             "gap_count": self.link.gap_count,
@@ -328,7 +328,7 @@ class Ieee1394Cycle(CycleWithStarts):
         """Mean time that the transactions take beyond the model [us]; None under the paper model."""
         if self.model == "paper":
             return None
-        return doubts.bias_us(self.exchanges, self.network, gap_count=self.link.gap_count)
+        return doubts.bias_us(self.exchanges, self.network, link=self.link)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """Inputs that are not known exactly."""

@@ -97,8 +97,8 @@ def gap_term_us(gap_count: Number, *, measured: Number = MAX_GAP_COUNT, symbol: 
     return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
 
 
-def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Number) -> Number:
-    """Mean time of a cycle beyond the model [us].
+def bias_us(exchanges: Sequence[Exchange], network: Network, *, link: Link) -> Number:
+    """Mean time of a cycle beyond the model; none beyond a lower bound [us].
 
     Half-count (b + d): b is the mean residual of Table I. d is the middle of two readings of it, which a single gap
     count cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4). An
@@ -110,9 +110,12 @@ def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Numbe
         Every transaction of the cycle.
     network
         The network.
-    gap_count
-        Gap count in force [1].
+    link
+        The link.
     """
+    if not link.has_gaps:
+        return 0.0
+    gap_count = link.gap_count
     mean_us = residual().mean_us
     of_split = total(
         halves * (choose(_is_fitted(node), 0.0, mean_us) + _split_gap_term_us(node, gap_count))
@@ -207,6 +210,9 @@ def of_inputs(
     execution
         Doubt of the execution times, where the cycle has any.
     """
+    if not link.has_gaps:
+        # What is left out of a lower bound has no doubt of its own: no verdict rests on the bound but "does not fit".
+        residual_us = gap_term_us = phy_delays = 0.0
     half_width_us = traced_with(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
     return (
         Doubt("residual", "residual of Table I", residual_us),

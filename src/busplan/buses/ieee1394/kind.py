@@ -1,4 +1,4 @@
-"""IEEE 1394 (FireWire) up to S400, as a kind of bus."""
+"""IEEE 1394 (FireWire), as a kind of bus."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Final
@@ -15,13 +15,20 @@ from busplan.buses.ieee1394.constants import (
     QUADLET_BYTES,
     REFERENCE_CABLE_M,
     SLICE_RATIO,
-    safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import EVENTS, STRETCHES, CycleWithStarts, Ieee1394Cycle
 from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
 from busplan.buses.ieee1394.rules import LIMITS, RULES, unsafe_words
 from busplan.buses.ieee1394.timing import Responder, transaction
-from busplan.buses.ieee1394.transactions import answers_split, charges_own_hops, gap_count_of, hops_of, is_broadcast
+from busplan.buses.ieee1394.transactions import (
+    answers_split,
+    charges_own_hops,
+    gap_count_of,
+    has_gaps,
+    hops_of,
+    is_broadcast,
+    safe_gap_count_of,
+)
 from busplan.buses.limits import (
     Cost,
     Key,
@@ -50,8 +57,14 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
     Raises
     ------
     BusplanError
-        Nodes do not answer such a transaction split: then no execution time is on the bus.
+        Nodes do not answer such a transaction split: then no execution time is on the bus. Or the times of the speed
+        are lower bounds.
     """
+    if not has_gaps(network):
+        raise BusplanError(
+            f"the time of packets at {network.profile.bus.speed} is known as a lower bound only: no execution time can "
+            "be found from a latency"
+        )
     if is_broadcast(network):
         raise BusplanError(
             'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
@@ -89,9 +102,11 @@ def _gap_count(network: Network) -> Setting:
     """The smallest safe gap count."""
     key = "bus.gap_count"
     empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
+    if not has_gaps(network):
+        return empty._replace(reason=f"{network.profile.bus.speed} has no gaps")
     if not network.profile.bus.cable_is_standard:
         return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
-    safe = plain(safe_gap_count(hops_of(network)))
+    safe = plain(safe_gap_count_of(network))
     return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
 
 
@@ -172,6 +187,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """Keys that the paper's equations have no term for."""
         profile = network.profile
         paper_has_not = {
+            "bus.speed": not has_gaps(network),
             "bus.cycle_master": profile.bus.cycle_master,
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
             "bus.charge_hops": profile.bus.charge_hops != "farthest",
@@ -232,20 +248,22 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             return "every packet at the hops of the farthest"
         if not charges_own_hops(network):
             return "every node at the hops of the farthest"
-        return f"every node at its own hops{'' if network.profile.bus.root == 'host' else ', arbitration at all'}"
+        is_at_all = network.profile.bus.root != "host" and has_gaps(network)
+        return f"every node at its own hops{', arbitration at all' if is_at_all else ''}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Hops, gap count, and a schedule other than the individual schedule."""
         hops, cycle = hops_of(network), network.profile.cycle
         schedule = (f"broadcast schedule by {cycle.broadcast_request} requests",) if is_broadcast(network) else ()
-        return (f"{plural(int(plain(hops)), 'hop')}", f"gap count {gap_count_of(network)}", *schedule)
+        gaps = f"gap count {gap_count_of(network)}" if has_gaps(network) else "no gaps: lower bounds"
+        return (f"{plural(int(plain(hops)), 'hop')}", gaps, *schedule)
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
         """An unsafe gap count, and cables that the table does not hold for."""
         bus = network.profile.bus
         sizes = [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]
         warnings = [unsafe_words(sized) for sized in sizes if not self.is_safe(sized)][:1]
-        if not bus.cable_is_standard:
+        if has_gaps(network) and not bus.cable_is_standard:
             warnings.append(
                 f"cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
                 "gap-count table holds for"

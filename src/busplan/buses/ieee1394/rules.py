@@ -20,10 +20,9 @@ from busplan.buses.ieee1394.constants import (
     QUADLET_BYTES,
     REFERENCE_CABLE_M,
     padded_bytes,
-    safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
+from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
 from busplan.buses.limits import Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules, told_apart
@@ -44,6 +43,10 @@ def _of_broadcast(value: Callable[[Network], Number]) -> Callable[[Network], Num
     return lambda network: value(network) if is_broadcast(network) else 0
 
 
+def _without_gaps(network: Network) -> int:
+    return int(not has_gaps(network))
+
+
 def _cycle_start_us(network: Network) -> Number:
     is_sent = network.profile.bus.cycle_master
     return Ieee1394Cycle(network, "standard").cycle_start_us if is_sent else 0.0
@@ -55,7 +58,7 @@ def unsafe_words(network: Network) -> str:
     cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
     return (
         f"gap count {gap_count_of(network)} is unsafe for {plural(int(plain(hops)), 'hop')} ({nodes}); "
-        f"the smallest safe one is {safe_gap_count(hops)}{cables}"
+        f"the smallest safe one is {safe_gap_count_of(network)}{cables}"
     )
 
 
@@ -115,9 +118,18 @@ LIMITS: Final = (
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
     Limit(
+        "arbitration",
+        "arbitration at {bus.speed} has no published time: the cycle is a lower bound",
+        _without_gaps,
+        lambda _network: 0,
+        doubt=lambda _network: 0.0,
+        perhaps=_without_gaps,
+        way_out="up to S400 all of it is known",
+    ),
+    Limit(
         "gap table",
         unsafe_words,
-        lambda network: safe_gap_count(hops_of(network)),
+        safe_gap_count_of,
         gap_count_of,
         way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
         role="safety",

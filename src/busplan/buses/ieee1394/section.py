@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
 from busplan.buses.ieee1394.constants import (
     ARBITRATION_HOLD_US,
@@ -33,13 +33,6 @@ from busplan.sections.cycle import (
 from busplan.sections.profile import Profile
 
 
-def _gap_arbitrated(value: object) -> object:
-    if value in ("S800", "S1600", "S3200"):
-        message = f"{value} arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. "
-        raise refused(Problem(f'{message}Expected "S100", "S200" or "S400"'))
-    return value
-
-
 def _gap_count(value: object, handler: ValidatorFunctionWrapHandler) -> object:
     # One message for the whole union, instead of one for each of its members.
     try:
@@ -52,15 +45,18 @@ GapCount = Annotated[Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] | Literal["op
 
 
 class Ieee1394Bus(BusSection):
-    """Section [bus]: an IEEE 1394 (FireWire) bus up to S400."""
+    """Section [bus]: an IEEE 1394 (FireWire) bus; from S800 on a lower bound."""
 
     kind: Literal["ieee1394"] = Field(description="Kind of bus", examples=["ieee1394"])
-    speed: Annotated[Speed, BeforeValidator(_gap_arbitrated)] = Field(
-        description="Speed code of all packets: S100, S200 or S400", examples=["S400"]
+    speed: Speed = Field(
+        description="Speed code of all packets. From S800 on no time of the arbitration is published: the cycle is a "
+        "lower bound, and no plan is shown to fit",
+        examples=["S400"],
     )
     gap_count: GapCount = Field(
         default=MAX_GAP_COUNT,
-        description='Gap count of all nodes, 0..63, or "optimal": the smallest safe one for the hops',
+        description='Gap count of all nodes, 0..63, or "optimal": the smallest safe one for the hops. Not used from '
+        "S800 on",
         examples=[MAX_GAP_COUNT],
     )
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[2])
@@ -104,7 +100,7 @@ class Ieee1394Bus(BusSection):
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
         default=None,
         description="Repeat delay of one PHY; without it 14 ticks of the base rate, 0.142 us (TI TSB12LV41: 0.144 us "
-        "in the worst case) [us]",
+        "in the worst case), and from S800 on none [us]",
         examples=[0.144],
     )
 

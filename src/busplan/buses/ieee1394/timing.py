@@ -12,6 +12,9 @@ from typing import Literal, NamedTuple
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
     BASE_RATE_MBIT_S,
+    BETA_ACKNOWLEDGE_US,
+    BETA_ARBITRATION_US,
+    BETA_PHY_DELAY_US,
     BLOCK_READ_REQUEST_BYTES,
     BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
     BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
@@ -49,6 +52,8 @@ class Link(NamedTuple):
         Length of a cable [m].
     phy_delay_us
         Repeat delay of a PHY [us]; None for that of the equations, 14 ticks of the gap clock.
+    has_gaps
+        Whether the bus arbitrates with gaps, as up to S400. Without them all times are lower bounds.
     """
 
     data_rate_mbit_s: Number
@@ -56,6 +61,7 @@ class Link(NamedTuple):
     hops: Number
     cable_length_m: Number
     phy_delay_us: Number | None = None
+    has_gaps: bool = True
 
 
 class Gaps(NamedTuple):
@@ -93,10 +99,14 @@ class Delays(NamedTuple):
 
     def over(self, hops: Number) -> "Delays":
         """The delays over other hops of the same bus."""
-        arbitration_us = equations.arbitration_phase_us(
-            hops, hop_us=self.hop_us, gap_count=self.link.gap_count, gap_clock_mbit_s=self.clock_mbit_s
-        )
-        acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(hops, hop_us=self.hop_us))
+        if self.link.has_gaps:
+            arbitration_us = equations.arbitration_phase_us(
+                hops, hop_us=self.hop_us, gap_count=self.link.gap_count, gap_clock_mbit_s=self.clock_mbit_s
+            )
+            acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(hops, hop_us=self.hop_us))
+        else:
+            arbitration_us = traced_with(BETA_ARBITRATION_US, hops)
+            acknowledge_us = traced_with(BETA_ACKNOWLEDGE_US, hops)
         return self._replace(
             link=self.link._replace(hops=hops),
             arbitration_us=named(arbitration_us, "arbitration_us", "ArbP"),
@@ -106,7 +116,7 @@ class Delays(NamedTuple):
 
 
 def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Delays:
-    """Arbitration, acknowledge and gaps of any transaction, equations (4), (6), (9) and (10).
+    """Arbitration, acknowledge, gaps of any transaction, equations (4), (6), (9), (10); lower bounds without gaps.
 
     Parameters
     ----------
@@ -118,6 +128,11 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
         Whether a single node answers on the bus.
     """
     rate_mbit_s, gap_count = link.data_rate_mbit_s, link.gap_count
+    if not link.has_gaps:
+        beta_phy_us = traced_with(BETA_PHY_DELAY_US, rate_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
+        hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us), "hop_us", "hop")
+        # The next packet need not wait until all nodes have one: only the way to a node and back is surely waited for.
+        return Delays(link, rate_mbit_s, Gaps(0.0, 0.0, 0.0, alone), hop_us, 0.0, 0.0, 0).over(0)
     clock_mbit_s = rate_mbit_s if model == "paper" else traced_with(BASE_RATE_MBIT_S, rate_mbit_s)
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
     subaction_us = equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)

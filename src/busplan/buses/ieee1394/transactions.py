@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from busplan.buses.cycle import BusEvent
-from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, safe_gap_count
+from busplan.buses.ieee1394.constants import BETA_SPEEDS, DATA_RATE_MBIT_S, safe_gap_count
 from busplan.buses.ieee1394.timing import Answer, Delays, Link, Phases, Responder, TimingModelName, transaction
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, named, plain, traced_with, worded
@@ -27,8 +27,20 @@ def hops_of(network: Network) -> Number:
     return worded(network.nodes, "N: a chain with the host at its end") if most is None else most
 
 
+def has_gaps(network: Network) -> bool:
+    """Whether the bus arbitrates with gaps, as up to S400."""
+    return network.profile.bus.speed not in BETA_SPEEDS
+
+
+def safe_gap_count_of(network: Network) -> Number:
+    """Smallest safe gap count for the hops; 0 without gaps [1]."""
+    return safe_gap_count(hops_of(network)) if has_gaps(network) else 0
+
+
 def gap_count_of(network: Network) -> Number:
-    """Gap count in force [1]."""
+    """Gap count in force; 0 without gaps [1]."""
+    if not has_gaps(network):
+        return 0
     given: Number | str = network.profile.bus.gap_count
     if not isinstance(given, str):
         return given
@@ -44,12 +56,17 @@ def link_of(network: Network) -> Link:
         hops=named(hops_of(network), "hops", "H"),
         cable_length_m=bus.cable_length_m,
         phy_delay_us=bus.phy_delay_us,
+        has_gaps=has_gaps(network),
     )
 
 
 def charges_own_hops(network: Network) -> bool:
-    """Whether each node is charged its own way, and not that to the farthest, as a broadcast is: it goes to all."""
-    return network.profile.bus.charge_hops == "own" and not is_broadcast(network)
+    """Whether each node is charged its own way, and not that to the farthest, as a broadcast is: it goes to all.
+
+    A lower bound has no longer way than a node's own.
+    """
+    is_own = network.profile.bus.charge_hops == "own" or not has_gaps(network)
+    return is_own and not is_broadcast(network)
 
 
 class GroupHops(NamedTuple):
@@ -66,9 +83,9 @@ class GroupHops(NamedTuple):
 
 
 def group_hops(network: Network) -> tuple[GroupHops, ...]:
-    """Hops of each group's nodes: in a chain their place in it, in a tree what the group says."""
+    """Hops of each group's nodes: in a chain their place in it, in a tree what the group says, or else 1."""
     if network.profile.bus.max_hops is not None:
-        return tuple(GroupHops(*(group.node.hops,) * 3) for group in network.groups)
+        return tuple(GroupHops(*(getattr(group.node, "hops", None) or 1,) * 3) for group in network.groups)
     chain: list[GroupHops] = []
     for group in network.groups:
         hops = GroupHops(1, (group.nodes + 1) / 2, group.nodes)
