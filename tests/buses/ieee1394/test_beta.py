@@ -35,18 +35,20 @@ def quadlets(payload_bytes: int) -> int:
     read=st.integers(5, 1000),
     write=st.integers(5, 1000),
     cable_m=st.floats(0.1, 20),
+    phy_us=st.sampled_from([None, 0.1]),
     has_tree=st.booleans(),
 )
 def test_the_bound_is_the_packets_the_executions_and_the_ways_there_and_back(
-    *, speed: str, nodes: int, read: int, write: int, cable_m: float, has_tree: bool
+    *, speed: str, nodes: int, read: int, write: int, cable_m: float, phy_us: float | None, has_tree: bool
 ) -> None:
     sizes = {"bus__nodes": nodes, "payload__read_bytes": read, "payload__write_bytes": write}
-    tree = {"bus__max_hops": 3} if has_tree else {}
+    tree: dict[str, Any] = {"bus__max_hops": 3} if has_tree else {}
+    tree |= {"bus__phy_delay_us": phy_us} if phy_us else {}
     found = result(network(speed, bus__cable_length_m=cable_m, **sizes, **tree))
     packet_bytes = 20 + nodes * (20 + 24 + quadlets(read) + 24 + quadlets(write) + 16)
     # In a tree no node is nearer than one hop; in a chain the node's place says it.
     hops = sum(1 if has_tree else node for node in range(1, nodes + 1))
-    way_us = 4 * hops * 0.023 * cable_m / 4.5
+    way_us = 4 * hops * (0.023 * cable_m / 4.5 + (phy_us or 0.0))
     execution_us = nodes * (2 * 5.0 + 0.01 * (read + write))
     assert found.required_us == pytest.approx(8 * packet_bytes / RATES_MBIT_S[speed] + way_us + execution_us, rel=1e-12)
     assert (found.bias_us, found.uncertainty_us) == (0, 0)
@@ -64,6 +66,22 @@ def test_a_plan_over_the_bound_does_not_fit_and_any_other_is_not_shown_to(speed:
         assert (found.verdict, found.safe_nodes) == (verdict, 0)
         assert found.own["gap_count_safe"]
         assert not busplan.check(changed).passed
+
+
+def test_cycle_starts_and_requests_to_broadcast_cost_their_packets_alone() -> None:
+    quiet, started = network("S800"), network("S800", bus__cycle_master=True, bus__isochronous_us=10)
+    start_us = 10 + 8 * 20 / RATES_MBIT_S["S800"]
+    quiet_us, started_us = result(quiet).required_us, result(started).required_us
+    starts = round((started_us - quiet_us) / start_us)
+    assert started_us - quiet_us == pytest.approx(starts * start_us)
+    assert starts == int(started_us / 125) + 1
+    # Broadcasts so long that the host's wait for them does not hide how they are asked for.
+    broadcast = {"cycle__schedule": "broadcast", "bus__nodes": 16, "payload__read_bytes": 1000}
+    by_request = {
+        result(network("S800", **broadcast, cycle__broadcast_request=request)).required_us
+        for request in ("priority", "isochronous")
+    }
+    assert len(by_request) == 1
 
 
 def test_the_answer_says_why_and_no_paper_model_goes_beside_it() -> None:
