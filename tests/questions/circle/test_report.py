@@ -63,7 +63,8 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     verdict = blocks(test, Sentence)[0]
     assert sentence_text(verdict) == (
         "ethercat-servo-8 at 1 ms and 3000 mm/min: no error source of this profile matters; circular deviation G "
-        "below 0.1 um, which says nothing of how round a machine is."
+        "below 0.1 um, which says nothing of how round a machine is: friction at reversals, backlash, squareness and "
+        "jitter are 0."
     )
     assert verdict.state == "warns"
     forms: tuple[Literal["table", "markdown", "html"], ...] = ("table", "markdown", "html")
@@ -79,6 +80,11 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     assert busplan.check("ethercat-servo-8").passed
     ideal = busplan.circle_test("dvrk")
     assert "largest contour error below 0.1 um" in texts(ideal)[0]
+    # The sources that a machine usually has are named where they are 0: of both axes.
+    assert "machine is: drive lag, friction at reversals, backlash, squareness and jitter are 0." in texts(ideal)[0]
+    small = {"servo.x.drive_lag_us": 1, "servo.y.reversal_mm_s": 1e-6, "mechanics.squareness_um_per_m": 1e-6}
+    some = busplan.circle_test(busplan.load_profile("dvrk", changes={**small, "delivery.jitter_us": 1e-6}))
+    assert "machine is: backlash is 0." in texts(some)[0]
     # Without a tolerance G of a whole turn says it, though chords leave the largest error over 0.1 um.
     changes = {"tolerance": {}, "servo.drive_lag_us": 1000, "circle.feed_mm_per_min": 3000}
     turn = busplan.circle_test(busplan.load_profile("ethercat-servo-8", changes=changes))

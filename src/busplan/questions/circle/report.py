@@ -58,9 +58,8 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
         none = Words("no error source of this profile matters", verdict.state)
         labels = [CIRCLE_BY_KEY[key].label for key in telling_measures(profile)]
         least = f"{listed(labels, 'and')} below {NEGLIGIBLE_MM * 1e3:g} um"
-        yield Sentence(
-            (*subject, ": ", none, f"; {least}, which says nothing of how round a machine is."), verdict.state
-        )
+        words = f"; {least}, which says nothing of how round a machine is{_are_zero(profile)}."
+        yield Sentence((*subject, ": ", none, words), verdict.state)
     else:
         yield Sentence((*subject, ": ", *_unjudged(profile, result), "."), verdict.state)
     yield sentence(
@@ -74,6 +73,21 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
             )
         ),
     )
+
+
+def _are_zero(profile: Profile) -> str:
+    """Name the usual error sources of a machine that a profile has not; empty if it has all."""
+    servo, mechanics, delivery = profile.servo, profile.mechanics, profile.delivery
+    axes = (servo, servo.x, servo.y)
+    usual = {
+        "drive lag": any(axis.drive_lag_us for axis in axes),
+        "friction at reversals": any(axis.reversal_mm_s for axis in axes),
+        "backlash": mechanics.backlash_mm,
+        "squareness": mechanics.squareness_um_per_m,
+        "jitter": delivery.jitter_us,
+    }
+    absent = [name for name, value in usual.items() if not value]
+    return f": {listed(absent, 'and')} {'is' if len(absent) == 1 else 'are'} 0" if absent else ""
 
 
 def _unjudged(profile: Profile, result: CircleFigures) -> tuple[Part, ...]:
