@@ -215,6 +215,12 @@ class CycleWithStarts(BusCycle):
         """The host's time, if the profile does not give it."""
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
+    def premises(self) -> tuple[str, ...]:
+        """Of a lower bound, that no bus of its speed was measured."""
+        if self.link.has_gaps:
+            return ()
+        return (f"packets and cables alone: no bus at {self.network.profile.bus.speed} was measured",)
+
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
         starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
