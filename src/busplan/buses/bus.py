@@ -96,6 +96,10 @@ class Bus(ABC):
         """Say what the latencies are of, and the settings in force."""
         return ", ".join(("the whole cycle", *self.setup_words(network)))
 
+    def evidence_for(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - most are tested as a whole
+        """The data files whose figures test such a network."""
+        return self.evidence_data
+
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:  # noqa: ARG002 - most can
         """Keys in the profile that a timing model has no term for; with any, the model does not apply."""
         return ()

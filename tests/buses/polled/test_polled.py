@@ -336,3 +336,18 @@ def test_a_sweep_is_its_points() -> None:
     for rate, retries, us in zip(*columns, strict=True):
         profile = changed("profibus-drives-6", bus__bit_rate_kbit_s=float(rate), bus__retries=int(retries))
         assert us == pytest.approx(required_us(profile), rel=1e-12)
+
+
+def test_each_protocol_names_what_tests_it_and_no_other() -> None:
+    said = {}
+    for name in ("profibus-drives-6", "dynamixel-arm-14"):
+        (verdict,) = busplan.capacity(name).to_dict()["verdicts"]
+        said[name] = next(line["text"] for line in verdict["lines"] if line["label"] == "checked against")
+    assert said["profibus-drives-6"] == "no published figures"
+    assert said["dynamixel-arm-14"].startswith("rates of 14 servos")
+    (on_profibus,) = (
+        row["tested"]
+        for row in busplan.compare("gantry-24", buses=["polled"]).to_dict()["buses"]
+        if row["kind"] == "polled"
+    )
+    assert on_profibus == []

@@ -183,6 +183,10 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         schedule = BroadcastCycle if is_broadcast(network) else Ieee1394Cycle
         return schedule(network, model)  # type: ignore[arg-type]
 
+    def evidence_for(self, network: Network) -> tuple[str, ...]:
+        """No figure from S800 on was published."""
+        return self.evidence_data if has_gaps(network) else ()
+
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:
         """Keys that the paper's equations have no term for."""
         profile = network.profile

@@ -151,6 +151,10 @@ class Polled(Bus):
         protocol = network.profile.bus.protocol
         return _TITLES.get(protocol, self.title) if isinstance(protocol, str) else self.title
 
+    def evidence_for(self, network: Network) -> tuple[str, ...]:
+        """The measured rates are of servos of one protocol."""
+        return self.evidence_data if network.profile.bus.protocol == "dynamixel-2" else ()
+
     def cycle(self, network: Network, *, model: str) -> PolledCycle:
         """The cycle of a network under a timing model."""
         return PolledCycle(network, model)

@@ -96,9 +96,9 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
 
-def checked_against(bus: "Bus", *, has_cycle: bool = True) -> str:
-    """Parts of a bus model that published figures test, and those that were never measured."""
-    tested = parts_tested(bus.evidence_data)
+def checked_against(data: Sequence[str], *, has_cycle: bool = True) -> str:
+    """Parts of a bus model that the published figures of data files test, and those that were never measured."""
+    tested = parts_tested(data)
     parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
     never = f"never measured: {', '.join(tested.untested)}" if tested.untested and has_cycle else ""
     return "; ".join(filter(None, (parts, never))) or "no published figures"

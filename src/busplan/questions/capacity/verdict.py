@@ -340,7 +340,7 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
     if verdict.premises:
         yield "rests on", Sentence(("; ".join(verdict.premises),))
-    yield "checked against", Sentence((checked_against(bus, has_cycle=bool(network.groups)),))
+    yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=bool(network.groups)),))
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))

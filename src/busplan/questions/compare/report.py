@@ -208,7 +208,7 @@ def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
     if machine.best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in machine.best.changes.items())
         sentences.append(Sentence((f"The smallest period is with {values}, which is free to change.",)))
-    sentences.append(Sentence((f"Checked against {checked_against(bus)}.",)))
+    sentences.append(Sentence((f"Checked against {checked_against(bus.evidence_for(machine.network))}.",)))
     return joined(Sentence((f"{machine.title}:",)), *sentences)
 
 
@@ -269,9 +269,10 @@ def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> Curve:
 
 def _record(machine: MachineOnKind | NotOnKind) -> Record:
     """A kind of bus as plain data; what a kind that cannot have the machine lacks is null."""
-    tested = parts_tested(machine.bus.evidence_data)
+    bus = machine.bus
+    tested = parts_tested(bus.evidence_data if isinstance(machine, NotOnKind) else bus.evidence_for(machine.network))
     head = {
-        "kind": machine.bus.kind,
+        "kind": bus.kind,
         "title": machine.title,
         "is_own": False,
         "why_not": [],

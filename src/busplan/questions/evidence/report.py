@@ -83,7 +83,7 @@ def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
     for kind in kinds:
         if not paper:
             bus = kind_named(kind.kind)
-            yield Sentence((f"{bus.title} (kind {bus.kind}): checked against {checked_against(bus)}.",))
+            yield Sentence((f"{bus.title} (kind {bus.kind}): checked against {checked_against(bus.evidence_data)}.",))
         for section in kind.sections:
             yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
 
