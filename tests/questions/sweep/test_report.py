@@ -72,6 +72,8 @@ def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     answer = busplan.sweep("paper-4ms", vary={"bus.gap_count": range(64)})
     assert sentences_of(answer)[-1] == "At 7 points the gap count is unsafe (gap_count_safe)."
     assert answer.sentences()[-1].state == "warns"
+    one = busplan.sweep("paper-4ms", vary={"bus.gap_count": [6, 7]})
+    assert sentences_of(one)[-1] == "At 1 point the gap count is unsafe (gap_count_safe)."
 
 
 @pytest.mark.parametrize("follows", [False, True])

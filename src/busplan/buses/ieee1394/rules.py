@@ -119,7 +119,7 @@ LIMITS: Final = (
     ),
     Limit(
         "arbitration",
-        "arbitration at {bus.speed} has no published time: the cycle is a lower bound",
+        "the arbitration of {bus.speed} has no published time, so the cycle is a lower bound",
         _without_gaps,
         lambda _network: 0,
         doubt=lambda _network: 0.0,

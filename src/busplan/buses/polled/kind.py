@@ -191,7 +191,7 @@ class Polled(Bus):
                 "way to ask",
                 Cost.SCHEDULE,
                 "bus.requests",
-                tuple(better for better in protocol.requests[: protocol.requests.index(way)][::-1]),
+                protocol.requests[: protocol.requests.index(way)][::-1],
                 "the protocol has no faster one",
             ),
         )
@@ -220,7 +220,7 @@ class Polled(Bus):
         bus, way = network.profile.bus, PolledCycle(network, STANDARD).way
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
         asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]
-        adapter = (f"adapter {bus.adapter_us:g} us a request (assumed until measured)",) if bus.adapter_us else ()
+        adapter = (f"adapter {bus.adapter_us:g} us a request",) if bus.adapter_us else ()
         return (name, f"{plain(bus.bit_rate_kbit_s):g} kbit/s", asked, *adapter)
 
 

@@ -89,9 +89,8 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
     safety = bus.safety.figure
     unsafe = 0 if safety is None else np.sum(~first[safety.key].astype(bool))
     if unsafe and safety is not None:
-        yield sentence(
-            f"At {{}} points the {bus.safety.setting} is unsafe ({safety.key}).", _points(unsafe), state="warns"
-        )
+        words = f"At {{}} {nouns(int(unsafe), 'point')} the {bus.safety.setting} is unsafe ({safety.key})."
+        yield sentence(words, _points(unsafe), state="warns")
 
 
 def _by_model(sweep: Sweep, table: Columns) -> Iterator[tuple[str, Columns]]:
