@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pydantic_sarif.model import StaticAnalysisResultsFormatSarifVersion210JsonSchema as Sarif
 
@@ -39,6 +39,9 @@ STARTS = st.lists(st.sampled_from([code[:length] for code in CODES for length in
 
 
 @given(STARTS, STARTS, st.sampled_from(CODES))
+@example(["BP1"], ["BP1"], "BP110")
+@example(["BP11"], ["BP1"], "BP110")
+@example(["BP1"], ["BP11"], "BP110")
 def test_the_longest_beginning_decides_and_ignore_in_a_tie(select: list[str], ignore: list[str], code: str) -> None:
     if code in NEVER_SUPPRESSED:
         expected = True
