@@ -238,7 +238,7 @@ _FARTHEST: Final = 1e6
 
 
 def reaches(network: Network) -> Iterator[Reach]:
-    """How far execution times, payloads, nodes and each number of the bus may grow, one at a time.
+    """How far execution times, nodes and each number of the bus may grow, one at a time.
 
     Parameters
     ----------
