@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from subprocess import CompletedProcess
 from types import UnionType
@@ -206,13 +207,18 @@ SHOWN_FIRST = "ieee1394"
 
 def constants_table(kind: str) -> list[str]:
     """Constants of a kind that nobody has published; `explain` has all of them."""
-    keys = ("unit", "grade", "source", "meaning")
+    rows = [row for row in constant_rows(kind_named(kind)) if row["grade"] != "published"]
     cells = [
-        [code(row["name"]), short(row["value"]), *(row[key] for key in keys)]
-        for row in constant_rows(kind_named(kind))
-        if row["grade"] != "published"
+        [
+            code(row["name"]),
+            f"{short(row['value'])} {row['unit']}".rstrip(),
+            row["grade"],
+            "as above" if row["source"] == above["source"] else row["source"],
+            row["meaning"],
+        ]
+        for above, row in pairwise(({"source": None}, *rows))
     ]
-    return table([f"constant of `{kind}`", "value", *keys], cells, left=6)
+    return table([f"constant of `{kind}`", "value", "grade", "source", "meaning"], cells, left=5)
 
 
 def figure_table(head: str, figures: Iterable[Figure]) -> list[str]:
@@ -242,10 +248,10 @@ def tables() -> Iterator[list[str]]:
         *dict.fromkeys(reference(kind_named("ieee1394").profile_model())),
     ]
     equations = (
-        [row["reference"], code(row["formula"]), re.sub(r", equations? [^;]*", "", row["source"])]
+        [row["reference"], code(row["formula"]), re.sub("Paper, section |, equations? [^;]*", "", row["source"])]
         for row in equation_rows()
     )
-    yield table(["reference", "formula", "source"], equations, left=3)
+    yield table(["equation", "formula", "section of the paper"], equations, left=3)
     yield constants_table(SHOWN_FIRST)
     figures = figures_of(kind_named(SHOWN_FIRST))
     yield figure_table("`capacity`", figures["capacity"].values())
