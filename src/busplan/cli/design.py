@@ -374,7 +374,9 @@ def measured_command(
 def emulate_command(
     profile: ProfileArgument,
     cycles: Annotated[int | None, option("--cycles N", "Length of the recording, in cycles.  [default: 1000]")] = None,
-    duration: Annotated[str | None, option("--duration TIME", "The same as a time with its unit.  [default: --cycles]")] = None,
+    duration: Annotated[
+        str | None, option("--duration TIME", "The same as a time with its unit.  [default: --cycles]")
+    ] = None,
     fault: Annotated[
         list[str] | None,
         option(
