@@ -382,7 +382,7 @@ def emulate_command(
         option(
             "--fault NAME[=VALUE]",
             "A fault of the machine; may be repeated. VALUE is how often it happens, as lost-frame=3, or how late, as "
-            "jitter=50us.  [default: 5 times]",
+            "jitter=50us.  [default: 5 times, a share of the period]",
         ),
     ] = None,
     seed: Annotated[int, option("--seed N", "Of jitter and data: the same gives the same bytes.  [default: 1]")] = 1,

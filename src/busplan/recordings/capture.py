@@ -42,9 +42,8 @@ _PCAP: Final = {
 _SECTION: Final = b"\x0a\x0d\x0d\x0a"
 _ORDER: Final = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
 _INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _STATISTICS, _PACKET = 1, 2, 3, 5, 6
-_COMMENT = 1
-_NAME, _RESOLUTION, _OFFSET = 2, 9, 14
-"""Options: comment of a section; of an interface its name, the tick of its stamps, and the seconds to add."""
+_COMMENT, _RESOLUTION, _OFFSET = 1, 9, 14
+"""Options: comment of a section; of an interface the tick of its stamps, and the seconds to add."""
 _DROPPED: Final = {_PACKET: (4,), _STATISTICS: (5, 7)}
 """Options of a block that count dropped packets: before a packet; by the interface, and by the operating system."""
 _MOST_WORDS: Final = 200
@@ -77,7 +76,7 @@ class CaptureNotes:
     interfaces: set[int] = field(default_factory=set)
     """Numbers of the interfaces of a pcapng file that its packets are of."""
     synthetic: str = ""
-    """What its comment or the name of its interface says of an emulated recording; empty where none was."""
+    """What its comment, or its frames, say of an emulation; empty where it is of a machine."""
     broken_at: int | None = None
     """Offset of the damage in the file, from which nothing is read; None for a whole file."""
 
@@ -224,7 +223,7 @@ class _PcapNg(_Walker):
             if at + size > len(content):
                 break
             if is_section:
-                self._find_mark(content[at + 24 : at + size - 4], _COMMENT)
+                self._find_mark(content[at + 24 : at + size - 4])
             else:
                 self._block(rows, kind, content, at, size)
             at += size
@@ -247,7 +246,6 @@ class _PcapNg(_Walker):
             notes.left_out += 1
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : end]))
-            self._find_mark(content[at + 16 : end], _NAME)
         elif kind == _STATISTICS:
             # A block of statistics counts all drops of its interface so far, also those that packets have counted.
             notes.dropped = max(notes.dropped, self._dropped(content[at + 20 : end], _STATISTICS))
@@ -271,12 +269,12 @@ class _PcapNg(_Walker):
             if code in _DROPPED[kind] and len(value) == number.size
         )
 
-    def _find_mark(self, options: bytes, wanted: int) -> None:
-        """Note what an option says of an emulated recording."""
+    def _find_mark(self, options: bytes) -> None:
+        """Note what the comment of a section says of an emulated recording."""
         for code, value in self._options(options):
             text = printable(value[:_MOST_WORDS].decode("utf-8", "replace"))
-            if code == wanted and text.partition(":")[0] == SYNTHETIC:
-                self._notes.synthetic = self._notes.synthetic or text
+            if code == _COMMENT and text.startswith(f"{SYNTHETIC}:"):
+                self._notes.synthetic = text
 
     def _options(self, content: bytes) -> Iterator[tuple[int, bytes]]:
         """Code and value of each option."""

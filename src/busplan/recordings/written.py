@@ -5,10 +5,13 @@ from struct import pack
 from typing import Final
 
 SYNTHETIC: Final = "synthetic"
-"""Name of the interface in an emulated recording, and the first word of its comment: measured values never rest on it.
+"""Name of the interface in an emulated recording, and the first word of its comment.
 
-Readers of candump's text, python-can among them, take no comment in it; every one takes the name of the interface.
+Of a CAN log it is the mark: readers of candump's text, python-can among them, take no comment in it, and all of them
+take any name in each line.
 """
+SYNTHETIC_PORT: Final = bytes.fromhex("00005e005301")
+"""Source of the frames of an emulated capture: an address for documentation, which no port has (RFC 7042)."""
 _SECTION, _INTERFACE, _PACKET = 0x0A0D0D0A, 1, 6
 _COMMENT, _NAME, _RESOLUTION = 1, 2, 9
 """Options: comment of any block, name of an interface, and the tick of its stamps."""

@@ -21,6 +21,7 @@ import pytest
 import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.buses.emulation import Fault
+from busplan.recordings.written import pcapng
 from tests.oracles import can_recording, ethercat_recording
 from tests.oracles.can_frames import fd_written_bits, written_bits
 from tests.oracles.random_plans import Plan, fitting
@@ -125,12 +126,29 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
     assert tried >= 3
 
 
-def test_several_faults_are_all_there(machines: Machines, tmp_path: Path) -> None:
+def test_several_faults_are_all_there_and_hit_cycles_of_their_own(machines: Machines, tmp_path: Path) -> None:
     for kind, faults in FAULTS.items():
         seed = next(seed for seed in SEEDS[kind] if "cycle" in machines(kind, seed).plan)
         answer = measured(machines(kind, seed), tmp_path, cycles=600, fault={fault.name: None for fault in faults})
-        named = {figure.quantity for figure in answer.outside}
-        assert {fault.shown_as for fault in faults} <= named
+        assert {fault.shown_as for fault in faults} <= {figure.quantity for figure in answer.outside}
+    often = {"missing-cycle": 60, "lost-frame": 60, "wrong-working-counter": 60}
+    answer = measured(shipped("ethercat-servo-8"), tmp_path, cycles=600, fault=often)
+    recorded = {figure.quantity: figure.recorded for figure in answer.figures}
+    shown_as = {fault.shown_as for fault in FAULTS["ethercat"] if fault.name in often}
+    assert {recorded[name] for name in shown_as} == {60}
+
+
+def test_a_plan_that_does_not_fit_is_emulated_as_it_is(tmp_path: Path) -> None:
+    slow = busplan.load_profile("can-servo-8", changes={"bus.bit_rate_kbit_s": 250})
+    busplan.emulate(slow, cycles=100).save(tmp_path / "slow.log")
+    answer = busplan.measured("can-servo-8", tmp_path / "slow.log")
+    assert "last PDO after SYNC" in {figure.quantity for figure in answer.outside}
+    assert logged((tmp_path / "slow.log").read_bytes())[-1].us < 400_000
+    # A frame lasts 18.6 us and a mailbox poll 14.4, and each waits for the one before.
+    short = busplan.load_profile("ethercat-servo-8", changes={"cycle.period_us": 25, "bus.master_jitter_us": 0})
+    stamps = [time_ns for time_ns, packet in packets(busplan.emulate(short, cycles=100).content) if not packet[6] & 2]
+    assert len(stamps) == 200
+    assert min(after - before for before, after in pairwise(stamps)) >= 14_000
 
 
 @pytest.mark.parametrize("name", SHIPPED[:2])
@@ -365,16 +383,25 @@ def test_a_synthetic_recording_never_counts_as_a_measurement(name: str, run: Run
         assert not (tmp_path / "new.toml").exists()
 
 
-@pytest.mark.parametrize("changed", [(b"\x01\x00", b"synthetic: "), (b"\x02\x00", b"synthetic")])
-def test_a_capture_is_synthetic_by_its_comment_or_by_the_name_of_its_interface(
-    changed: tuple[bytes, bytes], tmp_path: Path
-) -> None:
-    content = busplan.emulate("ethercat-servo-8", cycles=30).content
-    assert content.count(changed[1]) in (1, 2)
-    place = content.index(changed[1]) if changed[0] == b"\x01\x00" else content.rindex(changed[1])
-    path = tmp_path / "renamed.pcapng"
-    path.write_bytes(content[:place] + b"recordings"[:9] + content[place + 9 :])
+def test_a_capture_is_synthetic_by_its_comment_or_by_its_frames(tmp_path: Path) -> None:
+    seen = list(packets(busplan.emulate("ethercat-servo-8", cycles=30).content))
+    path = tmp_path / "converted.pcap"
+    path.write_bytes(ethercat_recording.pcap([(time_ns / 1000, packet) for time_ns, packet in seen]))
     assert "synthetic" in busplan.measured("ethercat-servo-8", path).shows_nothing[0]
+    others = [(time_ns, packet[:8] + b"\x5f" + packet[9:]) for time_ns, packet in seen]
+    path.write_bytes(pcapng(others, link=1, origin="by its comment"))
+    assert busplan.measured("ethercat-servo-8", path).shows_nothing[0].startswith("synthetic: by its comment;")
+    path.write_bytes(ethercat_recording.pcap([(time_ns / 1000, packet) for time_ns, packet in others]))
+    assert busplan.measured("ethercat-servo-8", path).shows_nothing == ()
+
+
+def test_a_comment_commands_no_terminal(tmp_path: Path) -> None:
+    content = busplan.emulate("ethercat-servo-8", cycles=30).content
+    path = tmp_path / "hostile.pcapng"
+    path.write_bytes(content.replace(b"emulated by", b"\x1b[2J\r\n\x07  \xff\xfe"))
+    (reason,) = busplan.measured("ethercat-servo-8", path).shows_nothing
+    assert reason.isprintable()
+    assert reason.startswith("synthetic: ")
 
 
 def test_a_recording_of_a_machine_is_not_synthetic() -> None:

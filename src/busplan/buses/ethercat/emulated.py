@@ -22,7 +22,7 @@ from busplan.buses.network import Network, hyperperiod
 from busplan.elementwise import plain
 from busplan.recordings.capture import ETHERNET
 from busplan.recordings.ethercat import COMMANDS, LOGICAL
-from busplan.recordings.written import pcapng
+from busplan.recordings.written import SYNTHETIC_PORT, pcapng
 
 _CODES: Final = {name: code for code, name in COMMANDS.items()}
 _STATE, _SYSTEM_TIME, _MAILBOX = 0x130 << 16, 0x910 << 16, 0x1080 << 16
@@ -40,8 +40,8 @@ _OF_MASTER: Final = {
     UNNAMED: _AS_ACONTIS,
 }
 """Command, address and data of the datagrams that `HOUSEKEEPING_BYTES` counts."""
-_PORTS: Final = bytes.fromhex("00005e005301"), bytes.fromhex("02005e005301")
-"""Source of a frame sent, an address for documentation (RFC 7042), and of one that has passed a device."""
+_PORTS: Final = SYNTHETIC_PORT, bytes([SYNTHETIC_PORT[0] | 2]) + SYNTHETIC_PORT[1:]
+"""Source of a frame that is sent, and of one that has passed a device."""
 _LEAST_PACKET: Final = 60
 
 MISSING: Final = Fault("missing-cycle", "the master sends no frame", "cycles without a frame")
