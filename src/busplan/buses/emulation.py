@@ -14,7 +14,7 @@ LEAST_SHARE: Final = 0.5
 """The host takes this share of its planned time, or more."""
 MOST_FRAMES: Final = 500_000
 _FIRST: Final = 3
-"""Cycles before the first fault: at an end of the recording a fault may be the machine's start."""
+"""Cycles before the first fault, which there may be the machine's start."""
 _ONE_OF: Final = 4
 """A fault hits at most one of so many cycles."""
 
@@ -57,7 +57,7 @@ class Emulation:
         if fault.name not in self.faults:
             return frozenset()
         number = int(self.faults[fault.name]) if fault.unit == "1" else TIMES
-        free = [cycle for cycle in among if _FIRST <= cycle < self.cycles - 1 and cycle not in self._hit]
+        free = [cycle for cycle in among if cycle >= _FIRST and cycle not in self._hit]
         if number > len(free) // _ONE_OF:
             why = f"of {len(free):,} cycles that may have it, it takes a quarter at most; give more cycles"
             raise BusplanError(f"fault {fault.name}: {number:,} times; {why}")

@@ -80,7 +80,8 @@ class _Machine:
         sent, unstuffed = streams(self.traffic), streams(replace(self.traffic, is_stuffed=False))
         emulation.require_few(sum(stream.identifiers * self.end_us / stream.period_us for stream in sent))
         self.senders = [sender for pair in zip(sent, unstuffed, strict=True) for sender in self._senders(*pair)]
-        cycles = range(emulation.cycles)
+        # After the last frame of a sender nobody knows whether one is missing.
+        cycles = range(emulation.cycles - int(max((plain(pdos.every) for pdos in self.traffic.pdos), default=1)))
         due = {name: [cycle for cycle in cycles if self._due(name, cycle)] for name in ("feedback", "command")}
         among = {SILENT: due["feedback"], TWICE: due["feedback"], LATE: due["command"]}
         self.hit = {fault: emulation.drawn(fault, among.get(fault, cycles)) for fault in FAULTS}

@@ -30,12 +30,14 @@ _STATE, _SYSTEM_TIME, _MAILBOX = 0x130 << 16, 0x910 << 16, 0x1080 << 16
 _OPERATIONAL: Final = 8
 _IMAGE, _OUTPUTS = 0x10000, 0x800000
 """Logical address of the process image; those of outputs alone (LWR) have the other bit, too."""
+_MAILBOXES: Final = 0x9000000
+"""Logical address of the state of all mailboxes, at TwinCAT."""
 _STATION: Final = 0x1001
 """Address of the first device."""
 _AS_ACONTIS: Final = (("NOP", 0, 4), ("APWR", _SYSTEM_TIME, 4), ("BRD", _STATE, 2))
 _OF_MASTER: Final = {
     "IgH": (("BRD", _STATE, 2),),
-    "TwinCAT": (("NOP", 0, 4), ("BRD", _STATE, 2), ("LRD", 0x9000000, 1)),
+    "TwinCAT": (("NOP", 0, 4), ("BRD", _STATE, 2), ("LRD", _MAILBOXES, 1)),
     "acontis": _AS_ACONTIS,
     UNNAMED: _AS_ACONTIS,
 }
@@ -88,7 +90,7 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     cycles = [tuple(_cycle(network, number)) for number in numbers]
     filled = [any(plain(entry.data_bytes) for entry in devices_at(network, number)) for number in numbers]
     emulation.require_few(2 * emulation.cycles * (sum(map(len, cycles)) / len(cycles) + polls))
-    due = [cycle for cycle in range(emulation.cycles) if filled[cycle % len(cycles)]]
+    due = [cycle for cycle in range(emulation.cycles - len(cycles)) if filled[cycle % len(cycles)]]
     packets = sorted(_packets(network, emulation, cycles, due), key=lambda packet: packet[0])
     return pcapng(packets, link=ETHERNET, origin=emulation.origin)
 
@@ -101,20 +103,21 @@ def _packets(
     jitter_us, bias_us = plain(bus.master_jitter_us), plain(BYTE_BIAS_US)
     nodes, way_us = int(plain(network.nodes)), plain(devices_us(network)) + plain(cables_us(network))
     missing, lost, wrong, late = (emulation.drawn(fault, due) for fault in FAULTS)
-    free_us = 0.0
+    free_ns = 0.0
     for cycle in range(emulation.cycles):
         late_us = jitter_us + emulation.faults[JITTER.name] if cycle in late else random.random() * jitter_us
-        back_us = way_us + random.uniform(LEAST_SHARE, 1) * plain(bus.master_us)
-        sent_us, of_cycle = max(cycle * plain(network.period_us) + late_us, free_us), cycles[cycle % len(cycles)]
+        back_us, of_cycle = way_us + random.uniform(LEAST_SHARE, 1) * plain(bus.master_us), cycles[cycle % len(cycles)]
+        # From a whole nanosecond on, so that stamps make no time longer than it is.
+        sent_ns: float = int(max(1000 * (cycle * plain(network.period_us) + late_us), free_ns))
         for number, frame in enumerate((*of_cycle, *_polls(network, cycle)) if cycle not in missing else (), start=1):
             data = [random.randbytes(part.size) if part.is_logical else b"" for part in frame]
-            yield int(sent_us * 1000), _packet(frame, data, cycle)
-            sent_us = free_us = sent_us + plain(sending_us(frame_bytes(sum(map(_bytes, frame)))))
-            back_us += bias_us * sum(map(len, data))
-            hit = {cycle} if number == len(of_cycle) else set()
-            if not hit & lost:
-                returned = _packet(frame, data, cycle, passed=nodes, is_taken=not hit & wrong)
-                yield int((sent_us + back_us) * 1000), returned
+            yield int(sent_ns), _packet(frame, data, cycle)
+            sent_ns = free_ns = sent_ns + 1000 * plain(sending_us(frame_bytes(sum(map(_bytes, frame)))))
+            back_us += bias_us * sum(part.size for part in frame if part.is_logical and part.address != _MAILBOXES)
+            is_last = number == len(of_cycle)
+            if not (is_last and cycle in lost):
+                is_taken = not (is_last and cycle in wrong)
+                yield int(sent_ns + 1000 * back_us), _packet(frame, data, cycle, passed=nodes, is_taken=is_taken)
 
 
 def _bytes(part: _Datagram) -> int:
