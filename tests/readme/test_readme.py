@@ -363,7 +363,7 @@ def test_every_json_key_is_listed(command: str) -> None:
 def test_every_command_with_a_document_is_listed() -> None:
     listed = re.findall(r"^### (.*)$", PAGES[FOLDER / "json.md"], re.MULTILINE)
     assert listed == list(DOCUMENTS)
-    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init", "import"}
+    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init", "import", "emulate"}
 
 
 def test_every_link_resolves() -> None:
