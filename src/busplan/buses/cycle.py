@@ -224,6 +224,10 @@ class BusCycle(ABC):
         """Mean time that the bus takes in addition to the timing model [us]; None where it is unknown."""
         return None
 
+    def possible_us(self) -> Number:
+        """Part of the cycle that is only possible: without it, a cycle that fits is not shown not to fit [us]."""
+        return 0.0
+
     def sync_jitter_us(self) -> Number:
         """Jitter of the synchronous packet due to the traffic of the cycle, +/- about its mean [us]."""
         return 0.0

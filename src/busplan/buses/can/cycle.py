@@ -347,6 +347,14 @@ class CanCycle(BusCycle):
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
+    def possible_us(self) -> Number:
+        """What queues add that are not by priority: the test of such queues is sufficient, not exact [us]."""
+        if not self.traffic.queues:
+            return 0.0
+        by_priority = CanCycle(self.network, self.model, self.number, repeated=self.repeated)
+        by_priority.traffic = replace(self.traffic, queues=frozenset())
+        return larger(self.required_us - by_priority.required_us, 0.0)
+
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
         if not self.traffic.has_cycle:
@@ -372,12 +380,18 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """Each node offers its highest message first, and how often an error repeats a frame."""
+        """The order of queues, and how often an error repeats a frame."""
+        bus, groups = self.network.profile.bus, self.network.groups
+        orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
+        known = sorted(order for order in orders if order is not None)
+        queues = f"queues: {' and '.join(known)}" if known else ""
+        if None in orders:
+            queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
         if is_off(self.traffic.error_burst):
-            return "priority queues: assumed", "no repeated frames"
+            return queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
         at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return "priority queues: assumed", f"repeated frames: {at_once}1 every {period_us:g} us"
+        return queues, f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""

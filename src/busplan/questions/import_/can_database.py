@@ -90,6 +90,8 @@ def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None)
             "name": machine.fact(message.name, line),
             "payload_bytes": machine.fact(message.length, line),
         }
+        if len(message.senders) == 1:
+            facts["sender"] = machine.fact(message.senders[0], line)
         if message.is_fd:
             facts["is_fd"] = machine.fact(True, line)
         if message.cycle_time:
