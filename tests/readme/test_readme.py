@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
+import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.buses.figure import Figure
 from busplan.cli import app
@@ -240,6 +241,15 @@ def further_tables(kind: str) -> Iterator[list[str]]:
         yield figure_table(f"{code(command)} of `{kind}`", own_figures)
 
 
+OTHER_FIGURE = "other figure"
+
+
+@cache
+def explained_keys() -> frozenset[str]:
+    """Figures of the page's kind that `explain` lists, with their meaning."""
+    return frozenset(figure.key for _, figure in busplan.explain("paper-4ms").figures)
+
+
 def tables() -> Iterator[list[str]]:
     """Every table of the program's own data, by its lines; the first of them is in one page alone."""
     yield [
@@ -253,10 +263,14 @@ def tables() -> Iterator[list[str]]:
     )
     yield table(["equation", "formula", "section of the paper"], equations, left=3)
     yield constants_table(SHOWN_FIRST)
-    figures = figures_of(kind_named(SHOWN_FIRST))
-    yield figure_table("`capacity`", figures["capacity"].values())
-    of_capacity = figures["capacity"].values()
-    yield figure_table("`latency`", (figure for figure in figures["latency"].values() if figure not in of_capacity))
+    explained = explained_keys()
+    figures = {
+        figure.key: figure
+        for register in figures_of(kind_named(SHOWN_FIRST)).values()
+        for figure in register.values()
+        if figure.key not in explained
+    }
+    yield figure_table(OTHER_FIGURE, figures.values())
     yield figure_table("`circle-test`", CIRCLE_BY_KEY.values())
     for kind in kind_names():
         if kind != SHOWN_FIRST:
@@ -333,14 +347,13 @@ def keys_of(document: object) -> Iterator[str]:
 
 
 def figure_keys() -> str:
-    """First cells of the tables of figures, whose keys mean the same in every document."""
-    pages = (PAGES[FOLDER / "models.md"], PAGES[FOLDER / "circle.md"])
-    return "".join(
-        re.match(r"\|[^|]*\|", row)[0]  # type: ignore[index]
-        for command in ("capacity", "latency", "circle-test")
-        for page in pages
-        for row in shown_table(f"| `{command}` |", page).splitlines()
+    """Keys of figures, which mean the same in every document: those of `explain`, and first cells of the tables."""
+    tables_of_figures = (
+        shown_table(f"| {OTHER_FIGURE} |", PAGES[FOLDER / "models.md"]),
+        shown_table("| `circle-test` |", PAGES[FOLDER / "circle.md"]),
     )
+    rows = (row for shown in tables_of_figures for row in shown.splitlines())
+    return "".join(row.split("|")[1] for row in rows) + "".join(map("`{}`".format, explained_keys()))
 
 
 def json_section(command: str) -> str:
