@@ -205,14 +205,13 @@ SHOWN_FIRST = "ieee1394"
 
 
 def constants_table(kind: str) -> list[str]:
-    """Constants of a kind that nobody has published; `explain` has all of them."""
-    keys = ("unit", "grade", "source", "meaning")
+    """Constants of a kind that nobody has published; `explain` has all of them, with their sources."""
     cells = [
-        [code(row["name"]), short(row["value"]), *(row[key] for key in keys)]
+        [code(row["name"]), f"{short(row['value'])} {row['unit']}".removesuffix(" 1"), row["grade"], row["meaning"]]
         for row in constant_rows(kind_named(kind))
         if row["grade"] != "published"
     ]
-    return table([f"constant of `{kind}`", "value", *keys], cells, left=6)
+    return table([f"constant of `{kind}`", "value", "grade", "meaning"], cells, left=4)
 
 
 def figure_table(head: str, figures: Iterable[Figure]) -> list[str]:
@@ -237,10 +236,10 @@ def tables() -> Iterator[list[str]]:
         *dict.fromkeys(reference(kind_named("ieee1394").profile_model())),
     ]
     equations = (
-        [row["reference"], code(row["formula"]), re.sub(r", equations? [^;]*", "", row["source"])]
+        [row["reference"], code(row["formula"]), re.sub("Paper, section |, equations? [^;]*", "", row["source"])]
         for row in equation_rows()
     )
-    yield table(["reference", "formula", "source"], equations, left=3)
+    yield table(["equation", "formula", "section of the paper"], equations, left=3)
     yield constants_table(SHOWN_FIRST)
     figures = figures_of(kind_named(SHOWN_FIRST))
     yield figure_table("`capacity`", figures["capacity"].values())
@@ -356,7 +355,7 @@ def test_every_json_key_is_listed(command: str) -> None:
 def test_every_command_with_a_document_is_listed() -> None:
     listed = re.findall(r"^### (.*)$", PAGES[FOLDER / "json.md"], re.MULTILINE)
     assert listed == list(DOCUMENTS)
-    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init", "import"}
+    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init", "import", "emulate"}
 
 
 def test_every_link_resolves() -> None:

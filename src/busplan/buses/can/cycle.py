@@ -25,7 +25,15 @@ from busplan.buses.can.frames import (
     streams,
     traffic_of,
 )
-from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
+from busplan.buses.can.waiting import (
+    before_the_last,
+    counted,
+    message_responses,
+    responses,
+    sent_in,
+    sync_response,
+    waits,
+)
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import COVERAGE, EventKind
@@ -294,12 +302,23 @@ class CanCycle(BusCycle):
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _, goes_before in self._before:
-            of_node = rounded_up((window_us + message.jitter_us) / message.period_us)
+            of_node = rounded_up((window_us + self._jitter_us(message)) / message.period_us)
             of_node = of_node if is_off(message.burst - 1) else of_node + message.burst - 1
             yield choose(goes_before, _of_all(message, of_node), 0)
 
+    def _jitter_us(self, message: Message) -> Number:
+        """How late a message comes to the frames of the cycle; from a queue, as late as that offers it [us]."""
+        if not self.traffic.queues or message.name == REPEATED:
+            return message.jitter_us
+
+        words = f"how late {message.name} may come, or its queue offers it"
+        return self.traffic.ask(lambda traffic: before_the_last(traffic, self._due, message.name)[1], words=words)
+
     def _goes_before_last(self, message: Message) -> Number:
         """Whether a message goes before the last of SYNC and all PDOs."""
+        if self.traffic.queues:
+            words = "the queue of SYNC or of a PDO may hold a larger identifier, and this goes before that"
+            return self.traffic.ask(lambda traffic: before_the_last(traffic, self._due, message.name)[0], words=words)
         if message.identifier_bits is self.traffic.identifier_bits:
             return message.identifier <= self._last
 

@@ -70,7 +70,8 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     frames = read_can(path, channel=channel, progress=progress)
     log = _Log(network, frames, share)
     day = day_of(int(frames.start_s * 1e9))
-    return Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))
+    compared = Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))
+    return compared.unless_synthetic(frames.synthetic)
 
 
 class DuePdos(NamedTuple):

@@ -281,7 +281,7 @@ def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
         if us < inf:
             why = f"its worst-case response time is {us:g} us, over its {message.deadline_us:g} us"
         else:
-            before = [stream for stream in streams(traffic) if stream.block <= message.last_place]
+            before = [stream for stream in streams(traffic) if stream.block <= message.end_place]
             errors = [repeated(before, traffic)] if traffic.error_burst else []
             load = sum(stream.frames_us / stream.period_us for stream in (*before, *errors))
             these = "it and repeated frames" if errors else "it"

@@ -22,7 +22,7 @@ from busplan.buses.can.equations import (
     UNMEASURED_SHARE,
     IdentifierBits,
 )
-from busplan.buses.can.frames import LOOP, NAMES, SYNC
+from busplan.buses.can.frames import HOST, LOOP, NAMES, NODE, SYNC
 from busplan.elementwise import Number
 from busplan.sections.base import (
     MAX_TIME_US,
@@ -56,6 +56,7 @@ PdoBytes = Annotated[
     Field(strict=False, min_length=1, max_length=int(MOST_PDOS)),
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
+Queue = Literal["priority", "fifo", "single-buffer"]
 _MOST_CYCLES = 1000
 
 
@@ -101,6 +102,12 @@ class CanBus(BusSection):
         description="Standard uncertainty of host_us; without it 10 % where that is measured or derived, else 50 % "
         "[us]",
         examples=[5],
+    )
+    queue: Queue | None = Field(
+        default=None,
+        description="Order in which host and nodes send what they have queued: priority, the smallest identifier "
+        "first; fifo, first in first out; single-buffer; without it priority, assumed",
+        examples=["fifo"],
     )
     error_period_us: PeriodUs | None = Field(
         default=None,
@@ -180,7 +187,15 @@ class CanPayload(PayloadSection):
         return (None, sum(lengths)) if self.pdo_per == "axis" else (sum(lengths), None)
 
 
-class CanGroup(CanPayload, GroupSection):
+class CanNode(NodeSection):
+    """Section [node]: a distributed node."""
+
+    queue: Queue | None = Field(
+        default=None, description="Order in which it sends what it has queued; without it that of the bus"
+    )
+
+
+class CanGroup(CanNode, CanPayload, GroupSection):
     """One of the sections [[group]]: nodes that are alike, in the order of their identifiers."""
 
     axes: GroupAxes = Field(examples=[4])
@@ -201,6 +216,12 @@ class CanMessage(Section):
     )
     per_node: bool = Field(
         default=False, description="Whether each node sends one, in the order of the profile", examples=[True]
+    )
+    sender: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
+        default=None,
+        description=f"Who sends it: {HOST}, {NODE} for one of nodes that are alike, a group, or another device by its "
+        "name. Messages of a sender share its queue",
+        examples=[HOST],
     )
     fd: bool = Field(default=False, description="Whether it is a CAN FD frame", examples=[True])
     brs: bool = Field(
@@ -233,6 +254,8 @@ class CanMessage(Section):
 
     @model_validator(mode="after")
     def _is_one_frame(self) -> Self:
+        if self.per_node and self.sender is not None:
+            raise refused(Problem("has each node for its sender", key="sender", kind="inconsistent"))
         if self.payload_bytes > FRAME_BYTES and not self.fd:
             why = f"is over the {FRAME_BYTES:g} bytes of a classical frame; fd = true allows {FD_FRAME_BYTES:g}"
             raise refused(Problem(why, key="payload_bytes"))
@@ -271,7 +294,7 @@ class CanProfile(Profile):
         description="The communication cycle; a network of messages alone has none",
     )
     payload: CanPayload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
-    node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
+    node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
     group: Annotated[tuple[CanGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )

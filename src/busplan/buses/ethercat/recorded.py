@@ -108,7 +108,8 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     seen = _Seen(network, frames, share)
     figures = tuple(seen.figures())
     day = day_of(int(frames.times_ns[0]))
-    return Recorded(figures, tuple(seen.remarks()), seen.edits(), day, seen.shows_nothing())
+    compared = Recorded(figures, tuple(seen.remarks()), seen.edits(), day, seen.shows_nothing())
+    return compared.unless_synthetic(frames.notes.synthetic)
 
 
 class _Seen:

@@ -49,8 +49,8 @@ class EthercatBus(BusSection):
     )
     process_data: ProcessData | None = Field(
         default=None,
-        description="How process data travel: LRW-separate, in bytes of their own; LRW-shared, in the same bytes; LRD-LWR, in "
-        "two datagrams; without it by the master",
+        description="How process data travel: LRW-separate, in bytes of their own; LRW-shared, in the same bytes; "
+        "LRD-LWR, in two datagrams; without it by the master",
         examples=[SEPARATE],
     )
     housekeeping_bytes: Annotated[tuple[HousekeepingBytes, ...], Field(strict=False)] | None = Field(

@@ -29,8 +29,8 @@ class PolledBus(BusSection):
     nodes: Count | None = Field(default=None, description="Nodes N, master not counted", examples=[14])
     requests: Requests | None = Field(
         default=None,
-        description="How nodes are asked: exchange, both ways in one request; sync, all nodes of a group in one; single, one "
-        "node one way; without it the first of these that the protocol has",
+        description="How nodes are asked: exchange, both ways in one request; sync, all nodes of a group in one; "
+        "single, one node one way; without it the first of these that the protocol has",
         examples=["sync"],
     )
     reads: Annotated[int, Field(ge=1, le=1000)] = Field(
