@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from subprocess import CompletedProcess
 from types import UnionType
@@ -203,23 +202,17 @@ def number(schema: dict[str, Any]) -> str:
 
 
 SHOWN_FIRST = "ieee1394"
-"""The kind whose keys and figures the pages of every kind show; a further kind shows what it has beside them."""
+"""The kind whose keys and figures the pages show; the page of a further kind shows what keys it has beside them."""
 
 
 def constants_table(kind: str) -> list[str]:
-    """Constants of a kind that nobody has published; `explain` has all of them."""
-    rows = [row for row in constant_rows(kind_named(kind)) if row["grade"] != "published"]
+    """Constants of a kind that nobody has published; `explain` has all of them, with their sources."""
     cells = [
-        [
-            code(row["name"]),
-            f"{short(row['value'])} {row['unit']}".rstrip(),
-            row["grade"],
-            "as above" if row["source"] == above["source"] else row["source"],
-            row["meaning"],
-        ]
-        for above, row in pairwise(({"source": None}, *rows))
+        [code(row["name"]), f"{short(row['value'])} {row['unit']}".removesuffix(" 1"), row["grade"], row["meaning"]]
+        for row in constant_rows(kind_named(kind))
+        if row["grade"] != "published"
     ]
-    return table([f"constant of `{kind}`", "value", "grade", "source", "meaning"], cells, left=5)
+    return table([f"constant of `{kind}`", "value", "grade", "meaning"], cells, left=4)
 
 
 def figure_table(head: str, figures: Iterable[Figure]) -> list[str]:
@@ -229,16 +222,11 @@ def figure_table(head: str, figures: Iterable[Figure]) -> list[str]:
 
 
 def further_tables(kind: str) -> Iterator[list[str]]:
-    """What a further kind of bus has of its own: keys, constants, and figures of `capacity` and `latency`."""
+    """What a further kind of bus has of its own: keys and constants; `explain` lists its figures."""
     known = set(reference(kind_named("ieee1394").profile_model()))
     own = [row for row in dict.fromkeys(reference(kind_named(kind).profile_model())) if row not in known]
     yield [f"| key of `{kind}` | values (default) | meaning |", "|---|---|---|", *own]
     yield constants_table(kind)
-    first = figures_of(kind_named(SHOWN_FIRST))
-    for command in ("capacity", "latency"):
-        figures = figures_of(kind_named(kind))[command]
-        own_figures = (figure for key, figure in figures.items() if figure != first[command].get(key))
-        yield figure_table(f"{code(command)} of `{kind}`", own_figures)
 
 
 OTHER_FIGURE = "other figure"
@@ -290,13 +278,17 @@ def test_tables_are_those_of_the_program() -> None:
         assert found.splitlines() == lines
 
 
-def test_the_command_that_a_page_names_has_all_constants() -> None:
+def test_the_command_that_a_page_names_has_all_constants_and_the_kind_s_own_figures() -> None:
     named = [re.findall(r"`busplan explain (\S+) --format json`", text) for text in PAGES.values()]
+    first = figures_of(kind_named(SHOWN_FIRST))
     kinds = []
-    for name in (one for names in named for one in names):
-        done = CliRunner().invoke(app, ["explain", name, "--format", "json"])
+    for name in (name for names in named for name in names):
+        document = json.loads(CliRunner().invoke(app, ["explain", name, "--format", "json"]).stdout)
         kinds.append(load(name).profile.bus.kind)
-        assert json.loads(done.stdout)["constants"] == constant_rows(kind_named(kinds[-1]))
+        assert document["constants"] == constant_rows(kind_named(kinds[-1]))
+        listed = {(row["command"], row["figure"]) for row in document["figures"]}
+        for command, figures in figures_of(kind_named(kinds[-1])).items():
+            assert {(command, key) for key, figure in figures.items() if figure != first[command].get(key)} <= listed
     assert sorted(kinds) == sorted(kind_names())
 
 

@@ -75,7 +75,7 @@ class Run(NamedTuple):
     """
 
     def events_us(self) -> Iterator[tuple[str, Number]]:
-        """Term and duration of each event of a single round, those of 0 left out [us]."""
+        """Term and duration of each event of a single round, without events of no duration [us]."""
         return ((event.term, event.us) for event in self.events if not is_off(event.us))
 
     def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:

@@ -433,7 +433,7 @@ class CanCycle(BusCycle):
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """The load of what is allowed, and the message that comes closest to its deadline."""
+        """Load beside its limit, and the message that comes closest to its deadline."""
         most = self.network.profile.limits.max_load
         words = f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed"
         if self.traffic.has_rates:

@@ -307,7 +307,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Two senders use one identifier: a problem for each key that sets those of the second."""
+    """Two senders use one identifier: a problem at each key that sets the identifiers of the second."""
     # Groups that the network joins have keys of their own.
     groups = [
         group._replace(nodes=nodes.nodes, members=(nodes,))
