@@ -6,6 +6,7 @@ import pytest
 
 import busplan
 from tests.buses.can.machines import figures, loaded, responses
+from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
 
 
 def changed(**changes: Any) -> busplan.Profile:
@@ -38,6 +39,26 @@ def test_a_message_waits_for_all_of_its_queue_and_all_that_those_wait_for() -> N
     assert found["m1"] == 3 * 135
     by_priority = responses(network({"sender": "a"}, {}, {}, {"sender": "a"}, {}))
     assert by_priority["m0"] == 2 * 135
+
+
+def test_what_was_held_up_in_a_queue_comes_twice_in_short_time() -> None:
+    keys = {"k": (10, 700, "a"), "m": (50, 10_000, ""), "x": (100, 50_000, "a")}
+    keys |= {f"y{number}": (60 + number, 50_000, "") for number in range(4)}
+    sent = [
+        {"name": name, "identifier": identifier, "period_us": period_us, **({"sender": sender} if sender else {})}
+        for name, (identifier, period_us, sender) in keys.items()
+    ]
+    # x is behind all y, and k behind x. As x starts m comes, and behind x both k.
+    queued_us = {**dict.fromkeys(keys, (0,)), "k": (1, 701), "m": (4 * 135 + 1,)}
+    messages = [
+        SimulatedMessage(Frame(identifier, 135), queued_us[name], queued_us[name], sender or name)
+        for name, (identifier, _, sender) in keys.items()
+    ]
+    run = simulate(Frame(0, 1), (), messages, period_us=1, host_us=(), orders={"a": None})
+    (response_us,) = run.responses_us[list(keys).index("m")]
+    assert response_us == 4 * 135 - 1
+    assert responses(network(*sent, queue="fifo"))["m"] == 4 * 135
+    assert responses(network(*sent, queue="priority"))["m"] == 3 * 135
 
 
 @pytest.mark.parametrize("order", ["fifo", "single-buffer"])

@@ -156,6 +156,7 @@ def test_a_database_alone_is_a_network_of_messages() -> None:
         ("Pressure", 0x100, 8, 20_000),
         ("Foreign", 0x18FEF1FE, 8, 100_000),
     ]
+    assert [each.sender for each in profile.message] == ["Drive", "Drive"]
     left_out, alone = answer.remarks
     assert left_out.endswith(": Door")
     assert alone.startswith("Messages alone, without a cycle")
