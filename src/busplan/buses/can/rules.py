@@ -168,8 +168,9 @@ def _when_full(load: float) -> str:
 
 
 def _load_words(network: Network) -> str:
-    load, most = plain(_load(network)), network.profile.limits.max_load
-    return f"the bus load is {load:.1%}, over limits.max_load, {most:.1%}{_when_full(load)}"
+    load, most = plain(_load(network)), network.profile.most_load
+    over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
+    return f"the bus load is {load:.1%}, over {over}{_when_full(load)}"
 
 
 def _pdos(network: Network) -> Number:
@@ -224,7 +225,7 @@ LIMITS: Final = (
         "load",
         _load_words,
         _load,
-        lambda network: network.profile.limits.max_load,
+        lambda network: network.profile.most_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
         has_rule=True,
@@ -254,7 +255,7 @@ LIMITS: Final = (
 def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
     if "load" in subject.deciding.exceeded:
-        load, most = subject.deciding.own["bus_load"], subject.network.profile.limits.max_load
+        load, most = subject.deciding.own["bus_load"], subject.network.profile.most_load
         yield RuleProblem(
             "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )

@@ -1,0 +1,218 @@
+"""CAN without SYNC: a motor answers the command that it gets, against a simulation of the bus.
+
+The simulation, tests/oracles/request_simulation.py, knows nothing of the model. An adversary puts other messages where
+they hurt. For many more networks: python -m tests.buses.can.test_can_requests 0 5000
+"""
+
+import sys
+from random import Random
+from typing import Any, Final, NamedTuple
+
+import pytest
+
+import busplan
+from busplan import BusplanError
+from busplan.buses.can.equations import frame_us
+from tests.buses.can.machines import figures, loaded, responses, terms
+from tests.oracles.request_simulation import Frame, Motor, Sent, simulate
+
+CYCLES: Final = 4
+WAYS: Final = ("polled", "burst")
+
+
+class Message(NamedTuple):
+    """Another message."""
+
+    identifier: int
+    size: int
+    period_us: int
+    jitter_us: int = 0
+
+
+class Arm(NamedTuple):
+    """Motors on a bus; the identifier of a motor's command is `command` and its number, that of its answer `answer`."""
+
+    motors: int
+    access: str
+    sizes: tuple[int, int] = (8, 8)
+    """Command and answer [bytes]."""
+    exec_us: int = 0
+    host_us: int = 0
+    command: int = 0x101
+    answer: int = 0x201
+    messages: tuple[Message, ...] = ()
+    data_rate: int = 0
+
+    def us(self, size: int, *, is_fd: bool = False) -> int:
+        rate = self.data_rate if is_fd else 0
+        us = frame_us(size, identifier_bits=11, bit_rate_kbit_s=1000, data_bit_rate_kbit_s=rate, is_stuffed=True)
+        return round(float(us) * 10)
+
+    def frames(self, first: int, motor: int, size: int) -> tuple[Frame, ...]:
+        """Frames of a command or an answer, in tenths of a microsecond."""
+        most = 64 if self.data_rate else 8
+        return tuple(
+            (first + motor + 0x100 * place, self.us(min(left, most), is_fd=bool(self.data_rate)))
+            for place, left in enumerate(range(size, 0, -most))
+        )
+
+    def data(self, period_us: float, **bus: Any) -> dict[str, Any]:
+        """Sections of a profile of it."""
+        rate = {"data_bit_rate_kbit_s": self.data_rate} if self.data_rate else {}
+        return {
+            "schema_version": 1,
+            "name": "arm",
+            "description": "an arm",
+            "bus": {"kind": "can", "bit_rate_kbit_s": 1000, "nodes": self.motors, "access": self.access}
+            | {"host_us": self.host_us}
+            | rate
+            | bus,
+            "cycle": {"period_us": period_us, "slice_ratio": 1},
+            "payload": {
+                "write_bytes": self.sizes[0],
+                "read_bytes": self.sizes[1],
+                "command_identifier": self.command,
+                "feedback_identifier": self.answer,
+            },
+            "node": {
+                "axes": 1,
+                "execution": {"kind": "linear", "grade": "measured", "base_us": self.exec_us, "per_byte_us": 0},
+            },
+            "message": [
+                {
+                    "name": f"m{place}",
+                    "identifier": message.identifier,
+                    "payload_bytes": message.size,
+                    "period_us": message.period_us,
+                    "jitter_us": message.jitter_us,
+                    "deadline_us": 20 * message.period_us,
+                }
+                for place, message in enumerate(self.messages)
+            ],
+        }
+
+    def run(self, period: int, drawn: Random | None, due: list[list[int]], queued: list[list[int]]) -> list[Sent]:
+        """Simulate it in tenths of a microsecond, with the longest times, or with drawn ones."""
+        low = 1.0 if drawn is None else drawn.choice((0.0, 0.5, 1.0))
+
+        def up_to(us: int) -> int:
+            return 10 * us if drawn is None else round(10 * us * drawn.uniform(low, 1))
+
+        motors = [
+            Motor(
+                self.frames(self.command, number, self.sizes[0]),
+                self.frames(self.answer, number, self.sizes[1]),
+                tuple(up_to(self.exec_us) for _ in range(CYCLES)),
+            )
+            for number in range(self.motors)
+        ]
+        hosts = [[up_to(self.host_us) for _ in motors] for _ in range(CYCLES)]
+        messages = [
+            ((message.identifier, self.us(message.size)), instants)
+            for message, instants in zip(self.messages, queued, strict=True)
+        ]
+        late = 0 if drawn is None else drawn.choice((0, 9))
+        starts = [period * cycle for cycle in range(1, CYCLES + 1)]
+        return simulate(
+            motors, messages, starts_us=starts, host_us=hosts, polled=self.access == "polled", late_us=late
+        )
+
+
+def drawn_arm(random: Random) -> Arm:
+    """Any arm, with messages before, between and behind its frames."""
+    is_fd = random.random() < 0.3
+    command, answer = random.choice(((0x101, 0x201), (0x201, 0x101), (0x101, 0x141)))
+    return Arm(
+        random.randint(1, 6),
+        random.choice(WAYS),
+        (random.choice((1, 8, 8, 12)), random.choice((1, 8, 8, 20))),
+        random.choice((0, 30, 200)),
+        random.choice((0, 10, 100)),
+        command,
+        answer,
+        tuple(
+            Message(identifier, random.randint(0, 8), random.choice((300, 700, 2000, 9000)), random.choice((0, 0, 400)))
+            for identifier in random.sample((0x10, 0x20, 0x180, 0x1F0, 0x700, 0x701), random.randint(0, 4))
+        ),
+        5000 if is_fd else 0,
+    )
+
+
+def drawn_instants(arm: Arm, random: Random, period: int, hurt: list[int]) -> tuple[list[list[int]], list[list[int]]]:
+    """When messages are due and queued: some of them a tick before an instant that hurts."""
+    dues, queues = [], []
+    for message in arm.messages:
+        us, due, queued = random.randint(0, 10 * message.period_us), [], []
+        while us < period * (CYCLES + 1):
+            near = [instant for instant in hurt if us <= instant - 1 <= us + 10 * message.jitter_us + period // 5]
+            if near and random.random() < 0.7:
+                us = max(us, random.choice(near) - 1 - (10 * message.jitter_us if random.random() < 0.5 else 0))
+            late = random.choice((0, 10 * message.jitter_us, random.randint(0, 10 * message.jitter_us)))
+            due.append(us)
+            queued.append(us + late)
+            us += 10 * message.period_us + random.choice((0, 0, random.randint(0, 5 * message.period_us)))
+        dues.append(due)
+        queues.append(sorted(queued))
+    return dues, queues
+
+
+def lasts(sent: list[Sent], period: int) -> list[int]:
+    """From the start of each cycle to its last answer."""
+    return [
+        max(frame.end_us for frame in sent if frame.sort == "answer" and frame.cycle == cycle) - period * (cycle + 1)
+        for cycle in range(CYCLES)
+    ]
+
+
+def attacked(arm: Arm, random: Random, *, rounds: int = 12) -> tuple[float, float] | None:
+    """The longest cycle of many runs and the bound [us]; None where the arm does not fit any period.
+
+    Responses of messages and of the arm's own frames are held against theirs on the way.
+    """
+    data = arm.data(100_000)
+    required_us = sum(terms(loaded(data)).values())
+    period_us = required_us * random.choice((1, 1, 1.2, 2))
+    if required_us > 60_000 or figures(loaded(arm.data(period_us))).verdict == "does not fit":
+        return None
+    period, most, hurt = round(10 * period_us), 0, list[int]()
+    bounds = responses(loaded(arm.data(period_us)))
+    if any(bounds[f"m{place}"] is None for place in range(len(arm.messages))):
+        return None
+    for _ in range(rounds):
+        due, queued = drawn_instants(arm, random, period, hurt)
+        sent = arm.run(period, random if random.random() < 0.5 else None, due, queued)
+        hurt = sorted({frame.queued_us for frame in sent if frame.sort != "message"})
+        worst = max(lasts(sent, period))
+        assert worst <= 10 * required_us + 0.01, (arm, worst / 10, required_us)
+        for frame in sent:
+            name = {"request": "command", "answer": "feedback"}.get(frame.sort, f"m{frame.number}")
+            start = due[frame.number][frame.cycle] if frame.sort == "message" else frame.queued_us
+            bound = bounds[name]
+            assert bound is not None
+            assert frame.end_us - start <= 10 * bound + 0.01, (arm, name, (frame.end_us - start) / 10, bound)
+        most = max(most, worst)
+    return most / 10, required_us
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_no_simulated_cycle_and_no_response_is_longer_than_its_bound(seed: int) -> None:
+    random = Random(seed)
+    attacked(drawn_arm(random), random)
+
+
+def main(first: int, number: int) -> None:
+    """Attack many arms, and say how close they came by the way of access."""
+    closest = dict.fromkeys(WAYS, 0.0)
+    tried = dict.fromkeys(WAYS, 0)
+    for seed in range(first, first + number):
+        random = Random(seed)
+        arm = drawn_arm(random)
+        result = attacked(arm, random)
+        if result and arm.messages:
+            tried[arm.access] += 1
+            closest[arm.access] = max(closest[arm.access], result[0] / result[1])
+    print(tried, closest)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))
