@@ -62,40 +62,56 @@ def simulate(
     late_us
         A frame that is queued so long behind the start of another still takes part in its arbitration.
     """
-    running = count()
-    coming: list[tuple[int, int, Frame, str, int, int]] = []
-    pending: list[tuple[int, int, int, int, str, int, int]] = []
-    left: dict[tuple[str, int, int], int] = {}
-    sent: list[Sent] = []
-
-    def put(when_us: int, frames: Sequence[Frame], sort: str, number: int, cycle: int) -> None:
-        left[sort, number, cycle] = len(frames)
-        for frame in frames:
-            heappush(coming, (when_us, next(running), frame, sort, number, cycle))
-
+    bus = _Bus(motors, host_us, polled=polled)
     for place, (frame, queued_us) in enumerate(messages):
         for instance, when_us in enumerate(queued_us):
-            put(when_us, [frame], "message", place, instance)
+            bus.put(when_us, [frame], "message", place, instance)
     for cycle, start_us in enumerate(starts_us):
         when_us = start_us
         for number in range(1 if polled else len(motors)):
             when_us += host_us[cycle][number]
-            put(when_us, motors[number].request, "request", number, cycle)
-    now_us = 0
-    while coming or pending:
-        if not pending:
-            now_us = max(now_us, coming[0][0])
-        while coming and coming[0][0] <= now_us + late_us:
-            when_us, run, (identifier, us), *whose = heappop(coming)
-            heappush(pending, (identifier, run, us, when_us, *whose))
-        _, _, us, when_us, sort, number, cycle = heappop(pending)
-        sent.append(Sent(sort, number, cycle, when_us, now_us, now_us + us))
-        now_us += us
-        left[sort, number, cycle] -= 1
-        if left[sort, number, cycle]:
-            continue
+            bus.put(when_us, motors[number].request, "request", number, cycle)
+    return bus.run(late_us)
+
+
+class _Bus:
+    """A bus while it runs."""
+
+    def __init__(self, motors: Sequence[Motor], host_us: Sequence[Sequence[int]], *, polled: bool) -> None:
+        self.motors, self.host_us, self.polled = motors, host_us, polled
+        self.running = count()
+        self.coming: list[tuple[int, int, Frame, str, int, int]] = []
+        self.left: dict[tuple[str, int, int], int] = {}
+
+    def put(self, when_us: int, frames: Sequence[Frame], sort: str, number: int, cycle: int) -> None:
+        """Queue all frames of a request, an answer or a message."""
+        self.left[sort, number, cycle] = len(frames)
+        for frame in frames:
+            heappush(self.coming, (when_us, next(self.running), frame, sort, number, cycle))
+
+    def run(self, late_us: int) -> list[Sent]:
+        """Send every frame: whenever the bus is free, that of the smallest identifier."""
+        pending: list[tuple[int, int, int, int, str, int, int]] = []
+        sent: list[Sent] = []
+        now_us = 0
+        while self.coming or pending:
+            if not pending:
+                now_us = max(now_us, self.coming[0][0])
+            while self.coming and self.coming[0][0] <= now_us + late_us:
+                when_us, run, (identifier, us), sort, number, cycle = heappop(self.coming)
+                heappush(pending, (identifier, run, us, when_us, sort, number, cycle))
+            _, _, us, when_us, sort, number, cycle = heappop(pending)
+            sent.append(Sent(sort, number, cycle, when_us, now_us, now_us + us))
+            now_us += us
+            self.left[sort, number, cycle] -= 1
+            if not self.left[sort, number, cycle]:
+                self.arrived(now_us, sort, number, cycle)
+        return sent
+
+    def arrived(self, now_us: int, sort: str, number: int, cycle: int) -> None:
+        """A motor answers a request; behind an answer a host that waits sends the next request."""
         if sort == "request":
-            put(now_us + motors[number].exec_us[cycle], motors[number].answer, "answer", number, cycle)
-        elif sort == "answer" and polled and number + 1 < len(motors):
-            put(now_us + host_us[cycle][number + 1], motors[number + 1].request, "request", number + 1, cycle)
-    return sent
+            self.put(now_us + self.motors[number].exec_us[cycle], self.motors[number].answer, "answer", number, cycle)
+        elif sort == "answer" and self.polled and number + 1 < len(self.motors):
+            when_us = now_us + self.host_us[cycle][number + 1]
+            self.put(when_us, self.motors[number + 1].request, "request", number + 1, cycle)

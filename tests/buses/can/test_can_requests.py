@@ -91,7 +91,7 @@ class Arm(NamedTuple):
             ],
         }
 
-    def run(self, period: int, drawn: Random | None, due: list[list[int]], queued: list[list[int]]) -> list[Sent]:
+    def run(self, period: int, drawn: Random | None, queued: list[list[int]]) -> list[Sent]:
         """Simulate it in tenths of a microsecond, with the longest times, or with drawn ones."""
         low = 1.0 if drawn is None else drawn.choice((0.0, 0.5, 1.0))
 
@@ -113,9 +113,7 @@ class Arm(NamedTuple):
         ]
         late = 0 if drawn is None else drawn.choice((0, 9))
         starts = [period * cycle for cycle in range(1, CYCLES + 1)]
-        return simulate(
-            motors, messages, starts_us=starts, host_us=hosts, polled=self.access == "polled", late_us=late
-        )
+        return simulate(motors, messages, starts_us=starts, host_us=hosts, polled=self.access == "polled", late_us=late)
 
 
 def drawn_arm(random: Random) -> Arm:
@@ -176,11 +174,11 @@ def attacked(arm: Arm, random: Random, *, rounds: int = 12) -> tuple[float, floa
         return None
     period, most, hurt = round(10 * period_us), 0, list[int]()
     bounds = responses(loaded(arm.data(period_us)))
-    if any(bounds[f"m{place}"] is None for place in range(len(arm.messages))):
+    if None in bounds.values():
         return None
     for _ in range(rounds):
         due, queued = drawn_instants(arm, random, period, hurt)
-        sent = arm.run(period, random if random.random() < 0.5 else None, due, queued)
+        sent = arm.run(period, random if random.random() < 0.5 else None, queued)
         hurt = sorted({frame.queued_us for frame in sent if frame.sort != "message"})
         worst = max(lasts(sent, period))
         assert worst <= 10 * required_us + 0.01, (arm, worst / 10, required_us)
@@ -200,6 +198,89 @@ def test_no_simulated_cycle_and_no_response_is_longer_than_its_bound(seed: int) 
     attacked(drawn_arm(random), random)
 
 
+@pytest.mark.parametrize("way", WAYS)
+def test_the_bound_is_reached_where_nothing_is_left_to_chance(way: str) -> None:
+    # Of commands at once: nodes whose answers go first, and at once, but for the last, which is the slowest.
+    arm = Arm(5, way, exec_us=200, host_us=30 if way == "polled" else 0, command=0x201, answer=0x101)
+    sent = arm.run(100_000, None, [])
+    if way == "burst":
+        motors = [
+            Motor(arm.frames(0x201, number, 8), arm.frames(0x101, number, 8), (2000 * (number == 4),) * CYCLES)
+            for number in range(5)
+        ]
+        starts = [100_000 * (cycle + 1) for cycle in range(CYCLES)]
+        sent = simulate(motors, [], starts_us=starts, host_us=[[0] * 5] * CYCLES, polled=False)
+    assert max(lasts(sent, 100_000)) == pytest.approx(10 * sum(terms(loaded(arm.data(10_000))).values()))
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_cycle_is_the_sum_of_its_parts(way: str) -> None:
+    """8 bytes, 11 bits, worst stuffing: 135 bits (Davis 2007)."""
+    parts = terms(loaded(Arm(8, way, exec_us=100, host_us=20).data(10_000)))
+    waits_us = 800 if way == "polled" else 100
+    assert parts["sync"] == 0
+    assert (parts["command"], parts["feedback"], parts["host"], parts["wait"]) == (1080, 1080, 160, waits_us)
+
+
+@pytest.mark.parametrize(("way", "number"), [("polled", 6), ("burst", 2)])
+def test_so_many_frames_of_a_lower_priority_block(way: str, number: int) -> None:
+    lower = Message(0x700, 8, 140)
+    blocked = terms(loaded(Arm(3, way, exec_us=50, messages=(lower,)).data(10_000, bit_rate_kbit_s=1000)))
+    assert blocked["blocking"] == number * 135
+
+
+def test_an_arm_of_eight_has_the_load_that_was_published() -> None:
+    """enactic/openarm_ros2, issue 82: about 22 %, 8 bytes each way, 125 Hz, 1 Mbit/s."""
+    profile = busplan.load_profile("can-motors-8")
+    assert figures(profile, "no-stuffing").own["bus_load"] == pytest.approx(0.222)
+    assert figures(profile).own["bus_load"] == pytest.approx(0.27)
+    assert figures(profile).verdict == "fits"
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_nine_motors_that_ran_at_1_khz_are_not_said_not_to_fit(way: str) -> None:
+    """enactic/openarm, issue 34: CAN FD at 1 and 5 Mbit/s, payload and times not said; here 8 bytes and none."""
+    result = figures(loaded(Arm(9, way, data_rate=5000).data(1000)))
+    assert result.verdict in ("fits", "not shown to fit")
+    assert result.own["bus_load"] == pytest.approx(0.99)
+
+
+def test_no_load_is_too_large_where_the_cycle_fits_unless_the_profile_says_so() -> None:
+    data = Arm(8, "burst").data(2200)
+    assert figures(loaded(data)).own["bus_load"] > 0.95
+    assert figures(loaded(data)).exceeded == ()
+    data["limits"] = {"max_load": 0.8}
+    assert figures(loaded(data)).exceeded == ("load",)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("bus.sync_counter", True),
+        ("bus.queue", "fifo"),
+        ("payload.every", 2),
+        ("servo.update", "next_sync"),
+    ],
+)
+def test_what_needs_a_sync_is_refused_without_it(key: str, value: Any) -> None:
+    data = Arm(2, "polled").data(10_000)
+    section, name = key.split(".")
+    data.setdefault(section, {})[name] = value
+    with pytest.raises(BusplanError, match=f'{key} = .*: asks for SYNC, and bus.access = "polled" has none'):
+        loaded(data)
+
+
+def test_a_command_rests_on_the_feedback_of_the_cycle_before() -> None:
+    profile = loaded(Arm(2, "polled", exec_us=100, host_us=10).data(10_000))
+    assert responses(profile)["loop"] == pytest.approx(10_000 + 2 * (10 + 135 + 100 + 135))
+
+
+def test_plan_asks_for_all_at_once_where_one_by_one_is_too_slow() -> None:
+    data = Arm(8, "polled", exec_us=200).data(2600)
+    assert figures(loaded(data)).verdict == "does not fit"
+    assert figures(loaded(data, bus__access="burst")).verdict == "fits"
+
+
 def main(first: int, number: int) -> None:
     """Attack many arms, and say how close they came by the way of access."""
     closest = dict.fromkeys(WAYS, 0.0)
@@ -211,7 +292,7 @@ def main(first: int, number: int) -> None:
         if result and arm.messages:
             tried[arm.access] += 1
             closest[arm.access] = max(closest[arm.access], result[0] / result[1])
-    print(tried, closest)
+    sys.stdout.write(f"{tried} {closest}\n")
 
 
 if __name__ == "__main__":

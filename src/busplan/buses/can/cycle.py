@@ -416,12 +416,15 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """Each node offers its highest message first, and how often an error repeats a frame."""
+        """Each node offers its highest message first, what a bound adds up, and how often an error repeats a frame."""
+        queues: tuple[str, ...] = ("priority queues: assumed",)
+        if self.traffic.has_cycle and self.traffic.access == "burst":
+            queues += ("no frame beside the slowest answer and the host's time: an upper bound",)
         if is_off(self.traffic.error_burst):
-            return "priority queues: assumed", "no repeated frames"
+            return *queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
         at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return "priority queues: assumed", f"repeated frames: {at_once}1 every {period_us:g} us"
+        return *queues, f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""

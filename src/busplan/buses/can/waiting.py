@@ -282,6 +282,8 @@ def sync_response(traffic: Traffic) -> Response:
 def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     """SYNC, the last stream of each PDO, and every message, with the worst-case response of its last frame.
 
+    Without SYNC a PDO may wait for each other one, as if all were queued at once: messages gather behind those before.
+
     Arguments are as `message_responses` has them, in plain numbers.
     """
     sent = _offered(traffic)
@@ -294,28 +296,8 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     }
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
-    alone = [[number] for number in ends.values()] if traffic.access == "polled" else [[*ends.values()]]
-    pdos = [
-        (sent[number], worst)
-        for numbers in alone
-        for number, worst in _worst(_beside(by_place, numbers, traffic), numbers, [_Start()], traffic).items()
-    ]
+    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], traffic).items()]
     return (*sync, *pdos, *message_responses(traffic))
-
-
-def _beside(sent: Sequence[Stream], answered: Sequence[int], traffic: Traffic) -> list[Stream]:
-    """All streams as a PDO may wait for them: of nodes that are asked one by one there is no other PDO but its own."""
-    if traffic.access != "polled" or not answered:
-        return list(sent)
-    whose = sent[answered[0]].name, sent[answered[0]].group
-    return [
-        stream
-        if stream.is_message
-        else stream._replace(first=stream.last, identifiers=1)
-        if (stream.name, stream.group) == whose
-        else stream._replace(identifiers=0, frame_us=0.0)
-        for stream in sent
-    ]
 
 
 def counted(traffic: Traffic, place: int) -> tuple[str, str]:
@@ -330,10 +312,6 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """
     answered, worst = responses(traffic)[place]
     higher, blocking, sent = [], "", _offered(traffic)
-    if not answered.is_message:
-        number = sent.index(answered)
-        sent = tuple(_beside(sent, [number], traffic))
-        answered = sent[number]
     for stream in arriving(sent, answered.end_place):
         if (stream.block if answered.is_message else stream.first_place) <= answered.end_place:
             higher.append(stream)
