@@ -175,7 +175,7 @@ class Bus(ABC):
         channel
             Of a recording of several channels, the name of the one that is compared.
         progress
-            Called with the bytes read and those of the file.
+            Called with the bytes read and the size of the file [bytes].
 
         Raises
         ------

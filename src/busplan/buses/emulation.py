@@ -28,7 +28,7 @@ class Fault(NamedTuple):
     shown_as: str
     """Figure of `measured` that shows it."""
     unit: Literal["1", "us"] = "1"
-    """Of its value: how often it happens, or how late."""
+    """Meaning of its value: how often it happens, or how late."""
     default: float = TIMES
     """Value without one given; of a time, in periods."""
 
@@ -47,7 +47,7 @@ class Emulation:
     _hit: set[int] = field(default_factory=set)
 
     def drawn(self, fault: Fault, among: Iterable[int]) -> frozenset[int]:
-        """Cycles that a fault hits, those of other faults left out; none unless it is asked for.
+        """Cycles that a fault hits, except cycles of other faults; none unless it is asked for.
 
         Raises
         ------

@@ -67,7 +67,7 @@ def plan_command(
         option(
             "--axes N",
             "Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes.  [default: "
-            "those of the nodes]",
+            "the axes of the nodes]",
             min=1,
             max=_MAX_AXES,
         ),
@@ -541,8 +541,8 @@ def compare_command(
 ) -> None:
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
-    The kinds are those of the paper: IEEE 1394, CAN, SERCOS, and the field buses whose master polls (PROFIBUS and
-    WorldFIP, the Factory Instrumentation Protocol, of which a new profile has PROFIBUS); beside them EtherCAT.
+    The kinds are the paper's, IEEE 1394, CAN, SERCOS and polled buses (PROFIBUS, WorldFIP), and
+    EtherCAT; a new profile of a polled bus is PROFIBUS.
 
     The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
     On its own kind the profile stays as it is. On another kind it gets the bus of a new profile, which is assumed; keys

@@ -106,7 +106,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
     channel
         Of several channels, the name of the one that is read.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------

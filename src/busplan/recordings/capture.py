@@ -98,7 +98,7 @@ def packets(path: Path, notes: CaptureNotes, *, link: int = ETHERNET, progress: 
     link
         Link type of the packets that are read.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------

@@ -93,7 +93,7 @@ def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
     path
         A pcap or pcapng file.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------

@@ -388,6 +388,14 @@ class CanCycle(BusCycle):
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
+    def possible_us(self) -> Number:
+        """What queues add that are not by priority: the test of such queues is sufficient, not exact [us]."""
+        if not self.traffic.queues:
+            return 0.0
+        by_priority = CanCycle(self.network, self.model, self.number, repeated=self.repeated)
+        by_priority.traffic = replace(self.traffic, queues=frozenset())
+        return larger(self.required_us - by_priority.required_us, 0.0)
+
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
         if not self.traffic.has_cycle:
@@ -416,15 +424,20 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """Each node offers its highest message first, what a bound adds up, and how often an error repeats a frame."""
-        queues: tuple[str, ...] = ("priority queues: assumed",)
+        """The order of queues, what a bound adds up, and how often an error repeats a frame."""
+        bus, groups = self.network.profile.bus, self.network.groups
+        orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
+        known = sorted(order for order in orders if order is not None)
+        queues = f"queues: {' and '.join(known)}" if known else ""
+        if None in orders:
+            queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
         if self.traffic.has_cycle and self.traffic.access == "burst":
-            queues += ("no frame beside the slowest answer and the host's time: an upper bound",)
+            queues += "; no frame beside the slowest answer and the host's time, an upper bound"
         if is_off(self.traffic.error_burst):
-            return *queues, "no repeated frames"
+            return queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
         at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return *queues, f"repeated frames: {at_once}1 every {period_us:g} us"
+        return queues, f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -466,7 +479,7 @@ class CanCycle(BusCycle):
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """The load of what is allowed, and the message that comes closest to its deadline."""
+        """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
         most = self.network.profile.most_load
         words = f"{_short(100 * plain(self.load))} %" + (f", {_short(100 * most)} allowed" if most < 1 else "")
         if self.traffic.has_rates:

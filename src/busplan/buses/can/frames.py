@@ -25,7 +25,7 @@ from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, l
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
-"""Instead of an identifier: the next behind those of the group before."""
+"""Stands for the identifier after the last one of the group before."""
 SYNC: Final = "SYNC"
 REPEATED: Final = "repeated frames"
 HOST: Final = "host"
@@ -48,11 +48,11 @@ class Pdos(NamedTuple):
     kind: TransactionKind
     group: str
     identifier: Number
-    """Of the first frame of the first PDO; `FOLLOWS` for the next behind those of the group before."""
+    """Identifier of the first frame of the first PDO; `FOLLOWS` continues the group before."""
     pdos: Number
     """PDOs of all its nodes [1]."""
     payload_bytes: Number
-    """Of each PDO [bytes]."""
+    """Data of each PDO [bytes]."""
     frame_bytes: tuple[float, ...] = (FRAME_BYTES,)
     """Most data of each of its frames in their order; further ones are as the last [bytes]."""
     most_bytes: int = int(MOST_PDOS * FRAME_BYTES)
@@ -79,7 +79,7 @@ class Message(NamedTuple):
     senders: Number = 1
     """Nodes that send it, each with the identifier behind that of the node before [1]."""
     data_bit_rate_kbit_s: Number = 0.0
-    """Of an FD frame, that of the bus where it does not switch; 0 for a classical frame."""
+    """Data bit rate of an FD frame, without a switch the bit rate of the bus; 0 for a classical frame."""
     burst: Number = 1
     """Frames that may come at once [1]."""
 
@@ -91,7 +91,7 @@ class Traffic:
     period_us: Number = MAX_TIME_US
     bit_rate_kbit_s: Number
     data_bit_rate_kbit_s: Number = 0.0
-    """Of SYNC and PDOs as FD frames; 0 where they are classical."""
+    """Data bit rate of SYNC and PDOs as FD frames; 0 for classical frames."""
     identifier_bits: Number = BASE_BITS
     sync_identifier: Number = 0
     sync_bytes: Number = 0

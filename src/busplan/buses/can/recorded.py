@@ -60,7 +60,7 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     channel
         Of several channels, the name of the one that is compared.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -255,7 +255,7 @@ class _Log:
         return us
 
     def _load(self) -> Iterator[RecordedFigure]:
-        """Load as it was, beside that of the plan and those of the same frames with worst and without stuff bits."""
+        """Recorded load, the planned load, and the recorded frames with the most stuff bits and with none."""
         count, is_fd = len(self.taken), self.frames.is_fd[self.taken]
         span_us = float(self.times_us[-1] - self.times_us[0])
         is_whole = self.has_switch or not self.frames.switched[self.taken].any()

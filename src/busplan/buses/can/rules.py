@@ -9,7 +9,16 @@ from typing import Final
 
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
-from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, repeated, streams, traffic_of
+from busplan.buses.can.frames import (
+    NOT_BY_PRIORITY,
+    Points,
+    Stream,
+    Traffic,
+    last_identifier,
+    repeated,
+    streams,
+    traffic_of,
+)
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
@@ -51,6 +60,32 @@ def _deadline(network: Network) -> Number:
     if not network.profile.message:
         return 0.0
     return traffic_of(network).ask(slowest, words="busy periods of all messages")
+
+
+def _perhaps_late(network: Network) -> Number:
+    """What a queue that is not by priority may add to the largest response over deadline: all but J + C of each [1]."""
+    if not traffic_of(network).queues:
+        return 0.0
+
+    def surely(traffic: Traffic) -> Number:
+        own = (stream for stream in streams(traffic) if stream.is_message)
+        share: Number = reduce(larger, ((one.jitter_us + one.frame_us) / one.deadline_us for one in own))
+        return share
+
+    return _deadline(network) - traffic_of(network).ask(surely, words="J + C over D of all messages")
+
+
+def _unknown_senders(network: Network) -> list[str]:
+    """Messages without a sender on a bus where some queue is not by priority: what they wait for is not known."""
+    profile = network.profile
+    orders = [profile.bus.queue, *(group.node.queue for group in network.groups)]
+    if not any(order in NOT_BY_PRIORITY for order in orders):
+        return []
+    return [message.name for message in profile.message if message.sender is None and not message.per_node]
+
+
+def _senders_words(network: Network) -> str:
+    return f"{first_of(_unknown_senders(network), 3)}: who sends it is not known, so neither what waits in its queue"
 
 
 def _kept_from_us(network: Network) -> float:
@@ -240,10 +275,21 @@ LIMITS: Final = (
         way_out="known periods have room",
     ),
     Limit(
+        "senders",
+        _senders_words,
+        lambda network: len(_unknown_senders(network)),
+        lambda _network: 0,
+        doubt=lambda _network: 0.0,
+        perhaps=lambda network: len(_unknown_senders(network)),
+        way_out="give message.NAME.sender",
+    ),
+    Limit(
         "deadline",
         _deadline_words,
         _deadline,
         lambda _network: 1,
+        doubt=lambda _network: 0.0,
+        perhaps=_perhaps_late,
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         period=lambda _limit, network: _kept_from_us(network),
         has_rule=True,
@@ -262,7 +308,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Two senders use one identifier: a problem for each key that sets those of the second."""
+    """Two senders use one identifier: a problem at each key that sets the identifiers of the second."""
     # Groups that the network joins have keys of their own.
     groups = [
         group._replace(nodes=nodes.nodes, members=(nodes,))

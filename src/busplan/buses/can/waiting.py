@@ -370,8 +370,9 @@ def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
 
     SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
     once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
-    that follows it sooner than a period later. Behind messages of its queue, and without SYNC, any of these may be as
-    late as the end.
+    that follows it sooner than a period later. Behind messages of their queue, and without SYNC, these may be as late
+    as the end of the cycle; SYNC behind such messages begins no other busy period, for all that is before it then is
+    sent in this cycle.
     """
     if not traffic.has_cycle:
         return [_Start()]
@@ -382,7 +383,7 @@ def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     lasts_us = _waits(sent, traffic, others_us).lasts_us
     if not traffic.has_sync or any(stream.queue_place is not None and not stream.is_message for stream in sent):
-        return [_Start(), _Start((SYNC, _FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
+        return [_Start(), _Start((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
     commands_us = lasts_us - us[_COMMAND]
     feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
     return [

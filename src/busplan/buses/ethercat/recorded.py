@@ -93,7 +93,7 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     share
         Quantile of the cycles for jitter and the master's time, 0.5..1.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------

@@ -72,7 +72,7 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
     channel
         Of several channels, the name of the one that is read.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
