@@ -5,6 +5,8 @@ they hurt. For many more networks: python -m tests.buses.can.test_can_requests 0
 """
 
 import sys
+from collections.abc import Callable
+from pathlib import Path
 from random import Random
 from typing import Any, Final, NamedTuple
 
@@ -17,6 +19,7 @@ from tests.buses.can.machines import figures, loaded, responses, terms
 from tests.oracles.request_simulation import Frame, Motor, Sent, simulate
 
 CYCLES: Final = 4
+Run = Callable[..., Any]
 WAYS: Final = ("polled", "burst")
 
 
@@ -266,6 +269,9 @@ def test_what_needs_a_sync_is_refused_without_it(key: str, value: Any) -> None:
     data = Arm(2, "polled").data(10_000)
     section, name = key.split(".")
     data.setdefault(section, {})[name] = value
+    if section == "servo":
+        assert loaded(data)  # nodes that close their loop themselves wait for no SYNC
+        data["servo"]["loop"] = "host"
     with pytest.raises(BusplanError, match=f'{key} = .*: asks for SYNC, and bus.access = "polled" has none'):
         loaded(data)
 
@@ -275,10 +281,34 @@ def test_a_command_rests_on_the_feedback_of_the_cycle_before() -> None:
     assert responses(profile)["loop"] == pytest.approx(10_000 + 2 * (10 + 135 + 100 + 135))
 
 
-def test_plan_asks_for_all_at_once_where_one_by_one_is_too_slow() -> None:
-    data = Arm(8, "polled", exec_us=200).data(2600)
-    assert figures(loaded(data)).verdict == "does not fit"
-    assert figures(loaded(data, bus__access="burst")).verdict == "fits"
+def test_plan_asks_for_all_at_once_where_one_by_one_is_too_slow(run: Run) -> None:
+    done = run("plan", "can-motors-8", "--nodes", "16", "--period", "8ms")
+    assert 'Enough would be to free the way to ask: bus.access = "burst"' in done.stdout
+    assert run("capacity", "can-motors-8", "--set", "bus.nodes=16", "--set", "bus.access=burst").returncode == 0
+
+
+def test_the_card_says_how_many_buses_carry_all_motors(run: Run) -> None:
+    card = run("capacity", "can-motors-8", "--set", "bus.nodes=30").stdout
+    assert "  buses           3 such buses, of 12 nodes or fewer\n" in card
+    assert run("capacity", "can-motors-8", "--set", "bus.nodes=12").returncode == 0
+    assert "such buses" not in run("capacity", "can-motors-8").stdout
+
+
+@pytest.mark.parametrize("command", [("emulate", "can-motors-8", "-o", "x.log"), ("measured", "can-motors-8", "y.log")])
+def test_a_log_without_sync_is_neither_emulated_nor_compared(
+    run: Run, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    (tmp_path / "y.log").write_text("(1.0) can0 141#00\n", encoding="utf-8")
+    done = run(*command, cwd=tmp_path)
+    assert (done.returncode, (tmp_path / "x.log").exists()) == (2, False)
+    assert 'bus.access = "polled" has none' in done.stderr
+
+
+def test_a_new_profile_of_motors_has_no_sync(run: Run, tmp_path: Path) -> None:
+    assert run("init", "arm", "--bus", "can-motors", cwd=tmp_path).returncode == 0
+    profile = busplan.load_profile(tmp_path / "arm.toml")
+    assert profile.bus.access == "polled"
+    assert terms(profile)["sync"] == 0
 
 
 def main(first: int, number: int) -> None:

@@ -375,7 +375,7 @@ class CanProfile(Profile):
         keys += (f"{section}.every" for section, payload in names.items() if payload.every > 1)
         sections = {**({} if self.node is None else {"node": self.node}), "bus": bus, **names}
         keys += (f"{name}.queue" for name, part in sections.items() if getattr(part, "queue", None) in NOT_BY_PRIORITY)
-        if "servo" in self.model_fields_set and self.servo.update == "next_sync":
+        if (self.servo.loop, self.servo.update) == ("host", "next_sync"):
             keys.append("servo.update")
         why = f'asks for SYNC, and bus.access = "{bus.access}" has none'
         more = {"queue": "; say priority", "update": "; say on_arrival"}
