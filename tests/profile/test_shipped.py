@@ -206,7 +206,7 @@ def test_a_copy_is_of_a_shipped_profile_alone(source: str, run: Run, work: Path)
     done = run("init", "x", "--from", source, cwd=work)
     assert (done.returncode, list(work.iterdir())) == (2, [])
     assert done.stderr.startswith(
-        f"--from {source}: no shipped profile; shipped are can-fd-arm-7, can-servo-8, canopen-6, dvrk, "
+        f"--from {source}: no shipped profile; shipped are can-fd-arm-7, can-fd-motors-8, can-motors-8, "
     )
 
 

@@ -1,7 +1,7 @@
-"""The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
+"""The cycle, of SYNC or of requests and answers, with the waits for other messages."""
 
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, partial, reduce
 from itertools import chain
@@ -18,6 +18,7 @@ from busplan.buses.can.frames import (
     Pdos,
     Stream,
     Traffic,
+    answer_us,
     frame_sizes,
     last_identifier,
     place,
@@ -90,6 +91,9 @@ class CanCycle(BusCycle):
     All nodes execute at once: feedback waits for the slowest of them, and so does the next SYNC behind the commands.
     Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire; frames of higher
     priorities go whenever they are queued.
+
+    Without SYNC the host sends a command to each node, which answers it with its feedback: one node after another, or
+    all commands at once, whose last answer comes no later than all frames and the slowest node together.
     """
 
     term_figures = TERMS
@@ -193,13 +197,15 @@ class CanCycle(BusCycle):
 
     @cached_property
     def sync_us(self) -> Number:
-        """SYNC [us]."""
-        return self._frame_us(self.traffic.sync_bytes)
+        """SYNC; 0 without it [us]."""
+        return self._frame_us(self.traffic.sync_bytes) if self.traffic.has_sync else 0.0
 
     def _wait_us(self, kind: TransactionKind, *, uncertainties: int = 0) -> Number:
         """The slowest execution of any node, with some standard uncertainties of each [us]."""
         if not self._groups:
             return 0.0
+        if not self.traffic.has_sync:
+            return answer_us(self._groups, access=self.traffic.access, uncertainties=uncertainties)
         return reduce(larger, (_execution_us(group, kind, uncertainties) for group in self._groups))
 
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
@@ -213,9 +219,33 @@ class CanCycle(BusCycle):
     def _of_pdo(self, event: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
         return (event._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
 
+    def _requests(self) -> Iterator[Run]:
+        """Requests and answers without SYNC; all at once go before the first answer, as the bound has it."""
+        host = BusEvent("host", "cycle_host_us", self.network.profile.bus.host_us, "host", rests_on="bus.host_us")
+        wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest answer")
+        commands, answers = [*self._frames("write")], [*self._frames("read")]
+        if self.traffic.access == "burst":
+            yield from (Run((host,), self.traffic.requests), *commands, Run((wait,)), *answers)
+            return
+        for group, command, answer in zip(self._groups, commands, answers, strict=True):
+            us = answer_us([group], access="burst")
+            executes = wait._replace(us=us, label="wait for the answer", transaction=NAMES["read"])
+            events = (host, *command.events, executes, *answer.events)
+            yield command._replace(events=events, laid_out=partial(self._of_request, host, command, executes, answer))
+
+    @staticmethod
+    def _of_request(host: BusEvent, command: Run, wait: BusEvent, answer: Run, number: Number) -> Iterator[BusEvent]:
+        """The frames of a request and of its answer."""
+        for before, run in ((host, command), (wait, answer)):
+            yield before
+            if run.laid_out:
+                yield from run.laid_out(number)
+
     @cached_property
     def _parts(self) -> tuple[tuple[Run, ...], ...]:
         """SYNC and the wait for feedback; feedback and the host; commands and the wait for their execution."""
+        if not self.traffic.has_sync:
+            return (tuple(self._requests()),)
         sync = BusEvent("sync", "cycle_sync_us", self.sync_us, "SYNC")
         ready = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
         host_us = self.traffic.host_us if self._groups else 0.0
@@ -232,14 +262,18 @@ class CanCycle(BusCycle):
         """The cycle node by node, with other messages as late for the commands as they can be."""
         if not self.traffic.has_cycle:
             return
-        opening, feedback, commands = self._parts
+        *before, commands = self._parts
         blocking_us, counts = self._waits
         blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
-        yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
-        yield from opening
-        yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
-        yield from feedback
-        yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
+        if self.traffic.has_sync:
+            opening, feedback = before
+            yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
+            yield from opening
+            yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
+            yield from feedback
+            yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
+        else:
+            yield blocking
         for count, (message, us, _) in zip(counts, self._before, strict=True):
             label = "repeated frame" if message.name == REPEATED else f"message {message.name}"
             kind = "repeated" if message.name == REPEATED else "message"
@@ -281,7 +315,7 @@ class CanCycle(BusCycle):
             By how much the rest takes longer [us].
         """
         blocking_us, counts = self._waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
-        return blocking_us + total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
+        return blocking_us + self._higher_us(counts)
 
     @property
     def _is_disturbed(self) -> bool:
@@ -305,10 +339,17 @@ class CanCycle(BusCycle):
 
             return self.traffic.ask(of, others_us, words=words)
 
-        words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
+        blocked = "3 B" if self.traffic.has_sync else "blocking"
+        words = f"w = others + {blocked} + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound at high load"
         lasts_us = named(figure("lasts_us", words), "busy_us", "w")
-        blocking_us = figure("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
-        return blocking_us, tuple(self._higher(lasts_us))
+        counts = tuple(self._higher(lasts_us))
+        if not self.traffic.has_sync:
+            return larger(lasts_us - others_us - self._higher_us(counts), 0.0), counts
+        return figure("blocking_us", "the 3 longest frames of a lower priority that can be there in w"), counts
+
+    def _higher_us(self, counts: Iterable[Number]) -> Number:
+        """Time of the frames that go before the last PDO, by their number [us]."""
+        return total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
 
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
@@ -371,10 +412,12 @@ class CanCycle(BusCycle):
         """The execution time and longer FD frames, by half of what they change; and the host's own time."""
         if not self.traffic.has_cycle:
             return ()
-        swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in TRANSACTION_KINDS)
+        kinds = TRANSACTION_KINDS if self.traffic.has_sync else TRANSACTION_KINDS[:1]
+        swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in kinds)
         key = "node.execution" if self.network.is_uniform else "group.execution"
         bus = self.network.profile.bus
-        host_us = choose(bus.pipeline_cycles > 0, 0.0, bus.host_doubt_us)
+        once_us = choose(bus.pipeline_cycles > 0, 0.0, bus.host_doubt_us)
+        host_us = once_us if self.traffic.has_sync else self.traffic.requests * bus.host_doubt_us
         doubts = Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
         if self.traffic.longest is self.traffic:
             return doubts
@@ -387,7 +430,8 @@ class CanCycle(BusCycle):
         if not self.traffic.has_cycle:
             return ()
         bus = self.network.profile.bus
-        host = () if bus.pipeline_cycles or bus.host_us else (LeftOut("host time", "bus.host_us"),)
+        is_beside = self.traffic.has_sync and bus.pipeline_cycles
+        host = () if is_beside or bus.host_us else (LeftOut("host time", "bus.host_us"),)
         slowest = (
             LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
             for group in self.network.groups
@@ -397,13 +441,15 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """The order of queues, and how often an error repeats a frame."""
+        """The order of queues, what a bound adds up, and how often an error repeats a frame."""
         bus, groups = self.network.profile.bus, self.network.groups
         orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
         known = sorted(order for order in orders if order is not None)
         queues = f"queues: {' and '.join(known)}" if known else ""
         if None in orders:
             queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
+        if self.traffic.has_cycle and self.traffic.access == "burst":
+            queues += "; no frame beside the slowest answer and the host's time, an upper bound"
         if is_off(self.traffic.error_burst):
             return queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
@@ -444,15 +490,15 @@ class CanCycle(BusCycle):
     @property
     def load_period_us(self) -> Number:
         """The shortest period that keeps `limits.max_load`; infinite where the other messages take all of it [us]."""
-        left = self.network.profile.limits.max_load - self._messages_load
+        left = self.network.profile.most_load - self._messages_load
         if not self.traffic.has_cycle:
             return choose(left >= 0, 0.0, inf)
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """Load beside its limit, and the message that comes closest to its deadline."""
-        most = self.network.profile.limits.max_load
-        words = f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed"
+        """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
+        most = self.network.profile.most_load
+        words = f"{_short(100 * plain(self.load))} %" + (f", {_short(100 * most)} allowed" if most < 1 else "")
         if self.traffic.has_rates:
             fullest = self._in_cycle_us / self.traffic.period_us + self._messages_load
             words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
@@ -486,7 +532,8 @@ class CanCycle(BusCycle):
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
         if self.model == WORST and self.traffic.longest is not self.traffic:
             return CanCycle(self.network, WORST, self.number, is_longest=True).latencies()
-        cycle = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
+        sync = ((SYNC, ""),) if self.traffic.has_sync else ()
+        cycle = (*sync, *((pdos.name, pdos.group) for pdos in self.traffic.pdos))
         names = (*cycle, *((message.name, "") for message in self.traffic.messages))
         loop = (BusLatency(LOOP, None, self._loop()),) if cycle else ()
         return (
@@ -511,7 +558,7 @@ class CanCycle(BusCycle):
     @property
     def _pipeline_cycles(self) -> Number:
         """Cycles from the one that brings feedback to the one that takes its commands, of the slowest group [1]."""
-        cycles: Number = self.network.profile.bus.pipeline_cycles
+        cycles = self._pipeline
         if not self.traffic.has_rates:
             return cycles
         due: Iterator[Number] = (rounded_up(cycles / pdos.every) * pdos.every for pdos in self.traffic.pdos)
@@ -519,7 +566,13 @@ class CanCycle(BusCycle):
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The host's pipeline, and the period to the next SYNC."""
-        return super().loop_periods(at_sync=at_sync) + int(plain(self.network.profile.bus.pipeline_cycles))
+        return super().loop_periods(at_sync=at_sync) + int(plain(self._pipeline))
+
+    @property
+    def _pipeline(self) -> Number:
+        """The host's pipeline; without SYNC at least 1, for a command goes before its feedback [1]."""
+        cycles: Number = self.network.profile.bus.pipeline_cycles
+        return cycles if self.traffic.has_sync else larger(cycles, 1)
 
     def sync_jitter_us(self) -> Number:
         """Half of what messages may hold SYNC up; infinite where that has no end, 0 where no SYNC is sent [us]."""
@@ -528,7 +581,7 @@ class CanCycle(BusCycle):
             worst = sync_response(traffic)
             return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
 
-        if not self.traffic.has_cycle:
+        if not self.traffic.has_sync:
             return 0.0
         return self.traffic.ask(held_up_us, words="frames before SYNC, B + I") / 2
 

@@ -74,6 +74,8 @@ class _Machine:
     def __init__(self, network: Network, emulation: Emulation) -> None:
         self.network, self.emulation, self.random = network, emulation, emulation.random
         self.traffic, self.period_us = traffic_of(network), _period_us(network)
+        if self.traffic.has_cycle and not self.traffic.has_sync:
+            raise BusplanError(f'a log with SYNC is emulated, and bus.access = "{self.traffic.access}" has none')
         self.end_us = emulation.cycles * self.period_us
         if not self.traffic.has_cycle and (others := emulation.faults.keys() - {ERRORS.name}):
             raise BusplanError(f"fault {min(others)}: a network of messages alone has no SYNC and no PDOs")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache, reduce
 from itertools import chain, islice, repeat
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.buses.can.equations import (
     BASE_BITS,
@@ -22,7 +22,7 @@ from busplan.buses.can.equations import (
     share_bytes,
 )
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, larger, plain, pointwise, smaller
+from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, larger, plain, pointwise, smaller, total
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
@@ -34,6 +34,8 @@ NODE: Final = "node"
 """Sender that is one of nodes that are alike; others are `HOST`, a group, or another device by its name."""
 NOT_BY_PRIORITY: Final = ("fifo", "single-buffer")
 """Orders of a queue in which a message may wait for others of its sender, whatever their priority."""
+Access: TypeAlias = Literal["sync", "polled", "burst"]
+"""How nodes come to send: all at SYNC, each at its request, one after another, or each at one of requests at once."""
 LOOP: Final = "loop"
 """Name of the way from SYNC to the executed commands."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
@@ -110,11 +112,23 @@ class Traffic:
     """Whether frames have the stuff bits of the worst case, or none."""
     queues: frozenset[frozenset[tuple[str, str]]] = frozenset()
     """Streams by name and group whose frames share a queue that is not by priority."""
+    access: Access = "sync"
+    """How nodes come to send."""
 
     @property
     def has_cycle(self) -> bool:
-        """Whether it has SYNC and PDOs; messages alone have none."""
+        """Whether it has PDOs; messages alone have none."""
         return bool(self.pdos)
+
+    @property
+    def has_sync(self) -> bool:
+        """Whether its cycle begins with SYNC."""
+        return self.has_cycle and self.access == "sync"
+
+    @property
+    def requests(self) -> Number:
+        """Requests of a cycle without SYNC, each with an answer [1]."""
+        return total(pdos.pdos for pdos in self.pdos if pdos.kind == "write")
 
     @property
     def has_rates(self) -> bool:
@@ -212,7 +226,7 @@ class Traffic:
         return replace(self, **cycle, pdos=tuple(pdos), messages=tuple(messages))
 
 
-_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-4]
+_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-5]
 """Its own numbers: fields before the PDOs and the messages."""
 _OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
 
@@ -241,18 +255,54 @@ def _traffic(network: Network) -> Traffic:
     alone = replace(alone, queues=frozenset(_queues(network)))
     if not groups:
         return alone
-    return replace(
+    traffic = replace(
         alone,
         period_us=network.period_us,
+        access=bus.access,
+        pdos=tuple(
+            _pdos(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
+        ),
+    )
+    if not traffic.has_sync:
+        return replace(traffic, read_us=answer_us(groups, access=bus.access), host_us=traffic.requests * bus.host_us)
+    return replace(
+        traffic,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
         read_us=reduce(larger, (group.read_execution_us + group.worst_extra_us for group in groups)),
         # Where the host computes in a cycle of its own, it takes no time of this one.
         host_us=choose(bus.pipeline_cycles > 0, 0.0, bus.host_us),
-        pdos=tuple(
-            _pdos(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
-        ),
     )
+
+
+def of_node(group: Group) -> Number:
+    """PDOs of a node of a group in one direction [1]."""
+    return larger(group.axes, 1) if group.payload.pdo_per == "axis" else 1
+
+
+def answer_us(groups: Iterable[Group], *, access: Access, uncertainties: int = 0) -> Number:
+    """Waits for nodes in a cycle without SYNC: for all of them one by one, or for the slowest [us].
+
+    Parameters
+    ----------
+    groups
+        The nodes. They answer a request when they have executed it, read and write side by side.
+    access
+        "polled" or "burst".
+    uncertainties
+        Standard uncertainties of each execution that are added [1].
+    """
+    each_us = [
+        larger(
+            group.read_execution_us + uncertainties * group.read_uncertainty_us,
+            group.write_execution_us + uncertainties * group.write_uncertainty_us,
+        )
+        + group.worst_extra_us
+        for group in groups
+    ]
+    if access == "burst":
+        return reduce(larger, each_us)
+    return total(group.nodes * of_node(group) * us for group, us in zip(groups, each_us, strict=True))
 
 
 def _queues(network: Network) -> Iterator[frozenset[tuple[str, str]]]:
@@ -281,9 +331,9 @@ def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> P
     identifier = getattr(payload, f"{NAMES[kind]}_identifier")
     if identifier is None:
         identifier = int(_FIRST[kind]) if is_first else FOLLOWS
-    of_node: Number = larger(group.axes, 1) if payload.pdo_per == "axis" else 1
-    payload_bytes = share_bytes(group.read_bytes if kind == "read" else group.write_bytes, pdos=of_node)
-    pdos = Pdos(kind, group.name, identifier, group.nodes * of_node, payload_bytes, every=payload.every)
+    number = of_node(group)
+    payload_bytes = share_bytes(group.read_bytes if kind == "read" else group.write_bytes, pdos=number)
+    pdos = Pdos(kind, group.name, identifier, group.nodes * number, payload_bytes, every=payload.every)
     lengths = getattr(payload, f"{NAMES[kind]}_pdos")
     if lengths is not None:
         return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))
@@ -466,7 +516,7 @@ def repeated_by_place(sent: Sequence[Stream], traffic: Traffic) -> Iterator[Stre
 
 
 def _cyclic(traffic: Traffic) -> Iterator[Stream]:
-    """SYNC and all PDOs; none of messages alone."""
+    """SYNC, if there is one, and all PDOs; none of messages alone."""
     if not traffic.has_cycle:
         return
     first, size = int(traffic.sync_identifier), _whole(traffic.sync_bytes)
@@ -483,7 +533,8 @@ def _cyclic(traffic: Traffic) -> Iterator[Stream]:
         deadline_us=traffic.period_us,
         identifier_bits=traffic.identifier_bits,
     )
-    yield sync
+    if traffic.has_sync:
+        yield sync
     blocks: dict[str, int] = {}
     free: dict[str, Points] = {}
     for pdos in traffic.pdos:

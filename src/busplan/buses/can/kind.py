@@ -23,6 +23,7 @@ from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting,
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
 from busplan.elementwise import plain
+from busplan.errors import BusplanError
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -53,6 +54,14 @@ def _higher(name: str, rate_kbit_s: float, rates_kbit_s: Sequence[float]) -> Set
     return Setting(name, name.replace("_", " "), Cost.SCHEDULE, (key,), higher, reason)
 
 
+def _at_once(access: str) -> Setting:
+    """All commands at once, where nodes are asked one by one."""
+    values = ({"bus.access": "burst"},) if access == "polled" else ()
+    return Setting(
+        "access", "way to ask", Cost.SCHEDULE, ("bus.access",), values, "" if values else "all at once already"
+    )
+
+
 def _identifier_bits(network: Network) -> Setting:
     """Identifiers of 11 bits, where all are small enough."""
     key, traffic = "bus.identifier_bits", traffic_of(network)
@@ -68,11 +77,18 @@ def _identifier_bits(network: Network) -> Setting:
     return Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), values, reason)
 
 
+_NO_SYNC: Final = 'bus.access = "{}" has none'
 _HOST_STEP_US: Final = 10.0
+_MOTORS: Final = """\
+[bus]
+kind = "can"
+bit_rate_kbit_s = 1000     # assumed: most robot motors
+access = "polled"          # a command, its answer, the next motor; "burst": all commands at once
+host_us = 20               # assumed: the host's time for each command; measure it"""
 
 
 class Can(Bus):
-    """CAN, classical or FD, whose nodes send at SYNC."""
+    """CAN, classical or FD, whose nodes send at SYNC or at a command of the host."""
 
     kind = "can"
     title = "CAN"
@@ -99,7 +115,10 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         slice_ratio="1            # assumed: the whole period is for communication",
         measure="measure both on a node: SYNC to its frame, command to effect",
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
-        variants={"can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000"},
+        variants={
+            "can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000",
+            "can-motors": _MOTORS,
+        },
         rate="bit_rate_kbit_s",
         more="""\
 # What else goes over the bus? Without it the load is too small. For example of CANopen nodes, each on its own:
@@ -123,6 +142,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.access": Key(chooses=True, meaning="if the host's software can"),
         "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough", short="{} kbit/s"),
         "bus.data_bit_rate_kbit_s": Key(
             "f_data", meaning="if transceivers and cable carry it", short="{} kbit/s of data"
@@ -157,7 +177,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         if not network.groups:
             return ", ".join(("worst case of every message", *self.setup_words(network)))
         nodes = "all nodes" if network.is_uniform else "each group"
-        return ", ".join((f"worst case of SYNC, of the last PDO of {nodes}", *self.setup_words(network)))
+        sync = "SYNC, of " if network.profile.bus.access == "sync" else ""
+        return ", ".join((f"worst case of {sync}the last PDO of {nodes}", *self.setup_words(network)))
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
         """A response time ends when the frame has arrived, and begins when it is queued."""
@@ -165,21 +186,23 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """PDOs of each axis, a higher bit rate, of CAN FD a higher data bit rate, identifiers of 11 bits."""
-        rate, data_rate = network.profile.bus.bit_rate_kbit_s, network.profile.bus.data_bit_rate_kbit_s
+        bus = network.profile.bus
+        rate, data_rate = bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s
         most = BIT_RATES[-1] if data_rate is None else data_rate
         return (
             *((_pdo_per(network),) if any(nodes.node.axes > 1 for nodes in network.profile.node_groups) else ()),
             _higher("bit_rate", rate, [higher for higher in BIT_RATES if higher <= most]),
             *(() if data_rate is None else (_higher("data_bit_rate", data_rate, DATA_BIT_RATES),)),
             _identifier_bits(network),
+            *(() if bus.access == "sync" else (_at_once(bus.access),)),
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """A slower host, SYNC with its counter, and identifiers of 29 bits; of a network with a cycle."""
-        bus = network.profile.bus
-        counted = "SYNC has its counter already" if bus.sync_counter else ""
+        bus, is_sync = network.profile.bus, network.profile.bus.access == "sync"
+        counted = "SYNC has its counter already" if bus.sync_counter else "" if is_sync else "there is no SYNC"
         extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
-        elsewhere = "the host computes in cycles of its own" if bus.pipeline_cycles else ""
+        elsewhere = "the host computes in cycles of its own" if is_sync and bus.pipeline_cycles else ""
         slower = {"bus.host_us": bus.host_us + _HOST_STEP_US}
         return (
             Perturbation(f"host +{_HOST_STEP_US:g} us", slower, elsewhere),
@@ -212,7 +235,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
             for nodes in network.profile.node_groups
             if nodes.payload.every > 1
         )
-        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *seldom)
+        access = {"polled": ("motors asked one by one",), "burst": ("all commands at once",)}.get(bus.access, ())
+        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *access, *seldom)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions of `busplan.buses.can.evidence`."""
@@ -229,6 +253,11 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     ) -> Recorded:
         """Compare a CAN log with the plan."""
         from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
+
+        if network.groups and network.profile.bus.access != "sync":
+            raise BusplanError(
+                f"{path}: a log is compared by its SYNCs, and {_NO_SYNC.format(network.profile.bus.access)}"
+            )
 
         return recorded(network, path, share=share, channel=channel, progress=progress)
 

@@ -219,8 +219,9 @@ def _when_full(load: float) -> str:
 
 
 def _load_words(network: Network) -> str:
-    load, most = plain(_load(network)), network.profile.limits.max_load
-    return f"the bus load is {load:.1%}, over limits.max_load, {most:.1%}{_when_full(load)}"
+    load, most = plain(_load(network)), network.profile.most_load
+    over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
+    return f"the bus load is {load:.1%}, over {over}{_when_full(load)}"
 
 
 def _pdos(network: Network) -> Number:
@@ -275,7 +276,7 @@ LIMITS: Final = (
         "load",
         _load_words,
         _load,
-        lambda network: network.profile.limits.max_load,
+        lambda network: network.profile.most_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         doubt=lambda _network: 0.0,
         perhaps=_late_load,
@@ -318,7 +319,7 @@ LIMITS: Final = (
 def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
     if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
-        load, most = plain(_load(subject.network)), subject.network.profile.limits.max_load
+        load, most = plain(_load(subject.network)), subject.network.profile.most_load
         yield RuleProblem(
             "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )

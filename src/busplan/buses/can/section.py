@@ -22,12 +22,13 @@ from busplan.buses.can.equations import (
     UNMEASURED_SHARE,
     IdentifierBits,
 )
-from busplan.buses.can.frames import HOST, LOOP, NAMES, NODE, SYNC
+from busplan.buses.can.frames import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
 from busplan.sections.base import (
     MAX_TIME_US,
     MIN_STEP_US,
     MISSING,
+    TRANSACTION_KINDS,
     Count,
     Problem,
     Section,
@@ -61,7 +62,7 @@ _MOST_CYCLES = 1000
 
 
 class CanBus(BusSection):
-    """Section [bus]: a bus of CAN 2.0 or CAN FD with a SYNC cycle."""
+    """Section [bus]: a bus of CAN 2.0 or CAN FD, with a cycle of SYNC or of requests and answers."""
 
     kind: Literal["can"] = Field(description="Kind of bus", examples=["can"])
     bit_rate_kbit_s: BitRate = Field(description="Bit rate of the bus [kbit/s]", examples=[1000])
@@ -77,6 +78,12 @@ class CanBus(BusSection):
         description="Length of identifiers, where a message does not say its own [bits]",
         examples=[11],
     )
+    access: Access = Field(
+        default="sync",
+        description="When nodes send: all at SYNC; each at a command of the host, which waits for its feedback before "
+        "the next one (polled); or the same with all commands at once (burst). Robot motors know no SYNC",
+        examples=["polled"],
+    )
     sync_identifier: Identifier = Field(
         default=int(SYNC_IDENTIFIER), description="Identifier of SYNC", examples=[int(SYNC_IDENTIFIER)]
     )
@@ -85,13 +92,14 @@ class CanBus(BusSection):
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
-        description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle. "
-        "For latency, and a loop on the host",
+        description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle; "
+        "without SYNC at least 1. For latency, and a loop on the host",
         examples=[1],
     )
     host_us: TimeUs = Field(
         default=0.0,
-        description="Host's time from the last feedback to the queued commands; used where pipeline_cycles is 0 [us]",
+        description="Host's time from the last feedback to the queued commands, used where pipeline_cycles is 0; "
+        "without SYNC its time for each command [us]",
         examples=[100],
     )
     host_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
@@ -270,14 +278,22 @@ class CanLimits(Limits):
 
     max_load: Annotated[float, Field(gt=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(MAX_LOAD),
-        description="Largest worst-case load of the bus, 0..0.999 (Lenze: 0.8)",
+        description="Largest worst-case load of the bus, 0..0.999 (Lenze: 0.8); without SYNC none, unless it is given",
         examples=[0.6],
     )
 
 
 _OF_NODES: Final = (*OF_ALIKE_NODES, "group")
 _OF_CYCLE: Final = {
-    "bus": ("sync_identifier", "sync_counter", "pipeline_cycles", "host_us", "host_grade", "host_uncertainty_us"),
+    "bus": (
+        "access",
+        "sync_identifier",
+        "sync_counter",
+        "pipeline_cycles",
+        "host_us",
+        "host_grade",
+        "host_uncertainty_us",
+    ),
     "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
 }
 """Keys of sections that only a network with a cycle has."""
@@ -305,8 +321,14 @@ class CanProfile(Profile):
 
     @property
     def has_cycle(self) -> bool:
-        """Whether it has nodes, and so SYNC and PDOs."""
+        """Whether it has nodes, and so a cycle."""
         return bool(self.group) or self.node is not None
+
+    @property
+    def most_load(self) -> Number:
+        """The largest load that is allowed; 1 without SYNC, where every frame has its place, unless it is given."""
+        is_given = self.bus.access == "sync" or "max_load" in self.limits.model_fields_set
+        return self.limits.max_load if is_given else 1.0
 
     @classmethod
     def nodes_problems(cls, given: Collection[str]) -> Iterator[Problem]:
@@ -324,6 +346,7 @@ class CanProfile(Profile):
     def _agrees_with_itself(self) -> Self:
         problems = (
             *(() if self.has_cycle else self._problems_of_no_cycle()),
+            *(() if self.bus.access == "sync" else self._problems_of_no_sync()),
             *self._names_problems(),
             *self._identifiers_problems(),
             *(() if self.bus.data_bit_rate_kbit_s is not None else self._problems_of_no_data_bit_rate()),
@@ -344,6 +367,24 @@ class CanProfile(Profile):
         keys += (f"message.{place}.per_node" for place, message in enumerate(self.message) if message.per_node)
         why = "asks for nodes, and a network of messages alone has none; remove it"
         yield from (Problem(why, key=key, kind="inconsistent") for key in keys)
+
+    def _problems_of_no_sync(self) -> Iterator[Problem]:
+        """Keys that only a cycle with SYNC has, and nodes without a command or an answer."""
+        bus, names = self.bus, dict(self._payloads())
+        keys = [f"bus.{name}" for name in ("sync_identifier", "sync_counter") if name in bus.model_fields_set]
+        keys += (f"{section}.every" for section, payload in names.items() if payload.every > 1)
+        sections = {**({} if self.node is None else {"node": self.node}), "bus": bus, **names}
+        keys += (f"{name}.queue" for name, part in sections.items() if getattr(part, "queue", None) in NOT_BY_PRIORITY)
+        if (self.servo.loop, self.servo.update) == ("host", "next_sync"):
+            keys.append("servo.update")
+        why = f'asks for SYNC, and bus.access = "{bus.access}" has none'
+        more = {"queue": "; say priority", "update": "; say on_arrival"}
+        yield from (Problem(f"{why}{more.get(key.split('.')[-1], '; remove it')}", key, "inconsistent") for key in keys)
+        for section, nodes in zip(names, self.node_groups, strict=True):
+            for kind in TRANSACTION_KINDS:
+                if nodes.bytes_of(kind) <= 0:
+                    why = "comes to 0 bytes, and a command and its answer have data"
+                    yield Problem(why, f"{section}.{nodes.payload.key_of(kind)}", "inconsistent")
 
     def _names_problems(self) -> Iterator[Problem]:
         """Names of messages that another message has, or the cycle."""

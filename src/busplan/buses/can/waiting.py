@@ -2,7 +2,7 @@
 
 from array import array
 from collections.abc import Container, Iterator, Sequence
-from functools import cache, lru_cache
+from functools import cache, lru_cache, reduce
 from importlib import import_module
 from math import ceil, inf, isclose
 from types import ModuleType
@@ -21,7 +21,7 @@ from busplan.buses.can.frames import (
     repeated_by_place,
     streams,
 )
-from busplan.elementwise import choose, is_everywhere, is_off, plain, smaller, total
+from busplan.elementwise import choose, is_everywhere, is_off, larger, plain, smaller, total
 from busplan.english import first_of
 
 if TYPE_CHECKING:
@@ -83,6 +83,10 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     In a queue that is not by priority SYNC or a PDO may be behind each message of its sender. So frames go before it
     up to the last identifier of the queue.
 
+    Without SYNC each request meets such a bus, and so does each answer; of requests at once, the last of them and the
+    last answer behind an idle bus. Of two bounds the smaller one counts: as many of the longest frames of a lower
+    priority, or each of them that can be there.
+
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
@@ -116,6 +120,8 @@ def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: fro
         return Waits(others_us, 0.0, (), most)
     before = [(message, message.first_place <= last) for message in messages]
     lower = [(message, message.last_place > last) for message in messages]
+    if not traffic.has_sync:
+        return Waits(_of_requests_us(before, lower, traffic, others_us), 0.0, (), 0)
     columns = (
         [others_us + total(choose(goes, message.burst_us, 0.0) for message, goes in before)],
         [bit],
@@ -127,6 +133,36 @@ def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: fro
     _computing().cycle_waits(most, *arrays)
     lasts_us, blocking_us = (_points(array, 0, shape) for array in arrays[-2:])
     return Waits(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
+
+
+def _of_requests_us(
+    before: Sequence[tuple[Stream, Points]], lower: Sequence[tuple[Stream, Points]], traffic: Traffic, others_us: Points
+) -> Points:
+    """How long a cycle without SYNC lasts with messages that go before its last frame, or block it [us]."""
+    messages = [message for message, _ in before]
+    late = [
+        message._replace(jitter_us=choose(blocks, larger(message.jitter_us, message.deadline_us), message.jitter_us))
+        for message, blocks in lower
+    ]
+    longest_us = reduce(larger, (choose(blocks, message.frame_us, 0.0) for message, blocks in lower))
+    number = 2 * traffic.requests if traffic.access == "polled" else 2
+    bounds_us = []
+    for sent, goes, blocked_us in (
+        (messages, [goes for _, goes in before], number * longest_us),
+        (late, [True] * len(late), 0.0),
+    ):
+        once_us = total(choose(is_sent, message.burst_us, 0.0) for message, is_sent in zip(sent, goes, strict=True))
+        columns = (
+            [others_us + blocked_us + once_us],
+            [bit_us(traffic.bit_rate_kbit_s)],
+            [choose(is_sent, message.frames_us, 0.0) for message, is_sent in zip(sent, goes, strict=True)],
+            [0.0] * len(sent),
+            *([getattr(message, key) for message in sent] for key in _OF_MESSAGES),
+        )
+        shape, arrays = _arrays(*columns, [0.0], [0.0])
+        _computing().cycle_waits(int(MOST_BLOCKS), *arrays)
+        bounds_us.append(_points(arrays[-2], 0, shape))
+    return smaller(*bounds_us)
 
 
 def before_the_last(traffic: Traffic, due: frozenset[str] | None, name: str) -> tuple[Points, Points]:
@@ -246,13 +282,17 @@ def sync_response(traffic: Traffic) -> Response:
 def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     """SYNC, the last stream of each PDO, and every message, with the worst-case response of its last frame.
 
+    Without SYNC a PDO may wait for each other one, as if all were queued at once: messages gather behind those before.
+
     Arguments are as `message_responses` has them, in plain numbers.
     """
     sent = _offered(traffic)
-    sync = [(sent[0], sync_response(traffic))] if traffic.has_cycle else []
+    sync = [(sent[0], sync_response(traffic))] if traffic.has_sync else []
     # The last frame of each PDO.
     ends = {
-        (stream.name, stream.group): number for number, stream in enumerate(sent) if number and not stream.is_message
+        (stream.name, stream.group): number
+        for number, stream in enumerate(sent)
+        if stream.name != SYNC and not stream.is_message
     }
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
@@ -330,8 +370,9 @@ def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
 
     SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
     once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
-    that follows it sooner than a period later. Behind messages of their queue these may be as late as the end of the
-    cycle; SYNC behind such messages begins no other busy period, for all that is before it then is sent in this cycle.
+    that follows it sooner than a period later. Behind messages of their queue, and without SYNC, these may be as late
+    as the end of the cycle; SYNC behind such messages begins no other busy period, for all that is before it then is
+    sent in this cycle.
     """
     if not traffic.has_cycle:
         return [_Start()]
@@ -341,7 +382,7 @@ def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
             us[stream.name] = us[stream.name] + stream.frames_us
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     lasts_us = _waits(sent, traffic, others_us).lasts_us
-    if any(stream.queue_place is not None and not stream.is_message for stream in sent):
+    if not traffic.has_sync or any(stream.queue_place is not None and not stream.is_message for stream in sent):
         return [_Start(), _Start((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
     commands_us = lasts_us - us[_COMMAND]
     feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]

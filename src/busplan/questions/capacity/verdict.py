@@ -205,6 +205,7 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
         *(_times(verdict) if network.groups else ()),
         *((label, Sentence((words,))) for label, words in verdict.bus_lines),
         *_room(verdict),
+        *_buses(verdict.deciding),
     ]
     if not is_brief:
         lines += _basis(verdict)
@@ -317,6 +318,13 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
         left_us = one.figures.margin_corrected_us
         left = "" if left_us is None else f", which leaves {_us(left_us, one.figures.uncertainty_us)} us"
         yield name, joined(settings, Sentence((left,)), by="")
+
+
+def _buses(figures: CapacityFigures) -> Iterator[_Line]:
+    """How many such buses would carry all nodes, where one is not shown to."""
+    most = figures.safe_nodes or 0
+    if 0 < most < figures.nodes:
+        yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:
