@@ -105,6 +105,8 @@ class Traffic(NamedTuple):
             data_bit_rate_kbit_s=rate,
             is_stuffed=True,
         )
+        # Nodes far apart make delimiter and acknowledge of an FD frame two bits long each.
+        us += 2 * 1000 / self.bit_rate if rate else 0
         return Frame(int(word.ljust(32, "0"), 2), int(us))
 
     @property

@@ -99,10 +99,20 @@ class CanCycle(BusCycle):
     term_figures = TERMS
     command_events = (("command", "command_frame"),)
 
-    def __init__(self, network: Network, model: str, number: int | None = None, *, repeated: int | None = None) -> None:
+    def __init__(
+        self,
+        network: Network,
+        model: str,
+        number: int | None = None,
+        *,
+        repeated: int | None = None,
+        is_longest: bool = False,
+    ) -> None:
         self.network = network
         self.model = model
         self.number = number
+        self.is_longest = is_longest
+        """Whether FD frames take the most bits in addition."""
         self.repeated = repeated
         """Frames that are repeated in a row, if not as the profile has it [1]."""
 
@@ -134,6 +144,7 @@ class CanCycle(BusCycle):
         traffic = traffic_of(self.network)
         if self.repeated is not None:
             traffic = replace(traffic, error_burst=self.repeated)
+        traffic = traffic.longest if self.is_longest else traffic
         return traffic if self.model == WORST else replace(traffic, is_stuffed=False)
 
     def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
@@ -151,6 +162,7 @@ class CanCycle(BusCycle):
                 identifier_bits=self.traffic.identifier_bits,
                 bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
                 data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
+                late_bits=self.traffic.late_bits,
                 is_stuffed=self.traffic.is_stuffed,
             )
             return named(us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
@@ -397,7 +409,7 @@ class CanCycle(BusCycle):
         return larger(self.required_us - by_priority.required_us, 0.0)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
+        """The execution time and longer FD frames, by half of what they change; and the host's own time."""
         if not self.traffic.has_cycle:
             return ()
         kinds = TRANSACTION_KINDS if self.traffic.has_sync else TRANSACTION_KINDS[:1]
@@ -406,7 +418,12 @@ class CanCycle(BusCycle):
         bus = self.network.profile.bus
         once_us = choose(bus.pipeline_cycles > 0, 0.0, bus.host_doubt_us)
         host_us = once_us if self.traffic.has_sync else self.traffic.requests * bus.host_doubt_us
-        return Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
+        doubts = Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
+        if self.traffic.longest is self.traffic:
+            return doubts
+        longest = CanCycle(self.network, self.model, self.number, repeated=self.repeated, is_longest=True)
+        late_us = (longest.required_us - self.required_us) / 2
+        return *doubts, Doubt("fd_late_bits", "two more bits of each FD frame", late_us)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The host's own time, the slowest execution, and what else is on the bus."""
@@ -487,7 +504,7 @@ class CanCycle(BusCycle):
             words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
         lines = [("load", words)]
         if self._messages:
-            answers = message_responses(self.traffic)
+            answers = message_responses(self.traffic.longest)
             latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
             response = f"{_short(worst.us)} us of {_short(latest.deadline_us)}"
             words = response if worst.us < inf else "without a worst-case response time"
@@ -501,7 +518,7 @@ class CanCycle(BusCycle):
 
     def _late_with(self, repeated: int) -> str:
         """What is late, or not shown to be in time, with some repeated frames in a row; empty where nothing is."""
-        trial = CanCycle(self.network, self.model, repeated=repeated)
+        trial = CanCycle(self.network, self.model, repeated=repeated, is_longest=True)
         for message, worst in message_responses(trial.traffic, is_verdict=True):
             if not within(worst.us, message.deadline_us):
                 return message.name
@@ -513,6 +530,8 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
+        if self.model == WORST and self.traffic.longest is not self.traffic:
+            return CanCycle(self.network, WORST, self.number, is_longest=True).latencies()
         sync = ((SYNC, ""),) if self.traffic.has_sync else ()
         cycle = (*sync, *((pdos.name, pdos.group) for pdos in self.traffic.pdos))
         names = (*cycle, *((message.name, "") for message in self.traffic.messages))

@@ -43,6 +43,7 @@ FD_LONG_CRC_BITS: Final = CONSTANTS["FD_LONG_CRC_BITS"]
 FD_SHORT_BYTES: Final = CONSTANTS["FD_SHORT_BYTES"]
 FD_DELIMITER_BITS: Final = CONSTANTS["FD_DELIMITER_BITS"]
 FD_FRAME_BYTES: Final = CONSTANTS["FD_FRAME_BYTES"]
+FD_LATE_BITS: Final = CONSTANTS["FD_LATE_BITS"]
 SYNC_IDENTIFIER: Final = CONSTANTS["SYNC_IDENTIFIER"]
 FEEDBACK_IDENTIFIER: Final = CONSTANTS["FEEDBACK_IDENTIFIER"]
 COMMAND_IDENTIFIER: Final = CONSTANTS["COMMAND_IDENTIFIER"]
@@ -161,6 +162,7 @@ def frame_us(
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
     data_bit_rate_kbit_s: Number = 0.0,
+    late_bits: Number = 0.0,
     is_stuffed: bool,
 ) -> Number:
     """Time of a data frame on the wire [us].
@@ -173,6 +175,8 @@ def frame_us(
         Bit rate [kbit/s]; float or array.
     data_bit_rate_kbit_s
         Data bit rate of a CAN FD frame; 0 for a classical frame [kbit/s]; float or array.
+    late_bits
+        Nominal bits by which nodes far apart make a CAN FD frame longer, 0..`FD_LATE_BITS` [bits].
 
     Examples
     --------
@@ -183,6 +187,7 @@ def frame_us(
     """
     if not is_off(data_bit_rate_kbit_s):
         nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
+        nominal = nominal if is_off(late_bits) else nominal + late_bits
         return nominal * bit_us(bit_rate_kbit_s) + data * bit_us(data_bit_rate_kbit_s)
     bits = frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
     return bits * bit_us(bit_rate_kbit_s)
@@ -195,6 +200,7 @@ def payload_us(
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
     data_bit_rate_kbit_s: Number = 0.0,
+    late_bits: Number = 0.0,
     is_stuffed: bool,
 ) -> Number:
     """Time of all frames of a payload: each is filled before the next, and the last has the rest [us].
@@ -205,7 +211,7 @@ def payload_us(
         Payload, 1 or more [bytes]; float or array.
     frame_bytes
         Most data of each frame in their order; further ones are as the last [bytes].
-    identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, is_stuffed
+    identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, late_bits, is_stuffed
         As `frame_us` takes them.
 
     Examples
@@ -221,6 +227,7 @@ def payload_us(
             identifier_bits=identifier_bits,
             bit_rate_kbit_s=bit_rate_kbit_s,
             data_bit_rate_kbit_s=data_bit_rate_kbit_s,
+            late_bits=late_bits,
             is_stuffed=is_stuffed,
         )
 

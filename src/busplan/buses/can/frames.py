@@ -11,6 +11,7 @@ from busplan.buses.can.equations import (
     COMMAND_IDENTIFIER,
     ERROR_BITS,
     FD_FRAME_BYTES,
+    FD_LATE_BITS,
     FEEDBACK_IDENTIFIER,
     FRAME_BYTES,
     MAX_IDENTIFIER,
@@ -103,6 +104,8 @@ class Traffic:
     """From one error on the wire to the next; of bursts the mean time [us]."""
     error_burst: Number = 0
     """Errors that may come at once, each of which repeats a frame; 0 without errors [1]."""
+    late_bits: Number = 0.0
+    """Nominal bits that each FD frame takes in addition [bits]."""
     pdos: tuple[Pdos, ...] = ()
     messages: tuple[Message, ...] = ()
     is_stuffed: bool = True
@@ -132,6 +135,12 @@ class Traffic:
         """Whether some PDOs are not in every cycle."""
         return not all(is_off(pdos.every - 1) for pdos in self.pdos)
 
+    @cached_property
+    def longest(self) -> "Traffic":
+        """The same with FD frames as long as receivers accept; itself where they are so, or there are none."""
+        rates = self.data_bit_rate_kbit_s, *(message.data_bit_rate_kbit_s for message in self.messages)
+        return self if self.late_bits or all(map(is_off, rates)) else replace(self, late_bits=float(FD_LATE_BITS))
+
     def frame_us(self, data_bytes: Number, form: "Traffic | Message") -> Number:
         """Time of a frame [us].
 
@@ -147,6 +156,7 @@ class Traffic:
             identifier_bits=form.identifier_bits,
             bit_rate_kbit_s=self.bit_rate_kbit_s,
             data_bit_rate_kbit_s=form.data_bit_rate_kbit_s,
+            late_bits=self.late_bits,
             is_stuffed=self.is_stuffed,
         )
 

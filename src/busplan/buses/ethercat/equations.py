@@ -14,6 +14,7 @@ ProcessData = Literal["LRW-separate", "LRW-shared", "LRD-LWR"]
 SEPARATE: Final[ProcessData] = "LRW-separate"
 SHARED: Final[ProcessData] = "LRW-shared"
 SPLIT: Final[ProcessData] = "LRD-LWR"
+Starts = Literal["datagram", "frame"]
 Master = Literal["SOEM", "IgH", "ethercrab", "TwinCAT", "acontis"]
 UNNAMED: Final = "unnamed"
 """The master of a profile that names none."""

@@ -14,12 +14,13 @@ from busplan.buses.ethercat.equations import (
     Master,
     Port,
     ProcessData,
+    Starts,
     room_bytes,
 )
 from busplan.buses.ethercat.frames import MOST_CYCLES, checked_hyperperiod
 from busplan.elementwise import Number
 from busplan.errors import BusplanError
-from busplan.sections.base import MAX_COUNT, MISSING, Bytes, Count, Problem, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, refused
 from busplan.sections.cycle import (
     UNKNOWN_SHARE,
     BusSection,
@@ -133,6 +134,12 @@ class EthercatNode(NodeSection):
     cable_m: Annotated[float, Field(ge=0, le=_LONGEST_CABLE_M, allow_inf_nan=False)] = Field(
         default=0.0, description="Cable from the device before it, or from the master [m]", examples=[2]
     )
+    sync_window_us: Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="How far a frame may move against SYNC0 from cycle to cycle before the device reports an error; "
+        "used only with distributed clocks [us]",
+        examples=[50],
+    )
 
 
 def _no_time_without_axes(group: dict[str, Any]) -> dict[str, Any] | None:
@@ -148,6 +155,12 @@ class EthercatGroup(EthercatNode, GroupSection):
     axes: GroupAxes = Field(examples=[4])
     every: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
         default=1, description="The group's process data go in every n-th cycle [1]", examples=[4]
+    )
+    starts: Starts | None = Field(
+        default=None,
+        description="What begins with the group: a datagram of its own, as of a domain of IgH, or a frame of its own, "
+        "as of a task of TwinCAT; without it its data follow in the datagram of the group before",
+        examples=["datagram"],
     )
     execution: Execution = Field(
         default_factory=_no_time_without_axes,
