@@ -220,7 +220,7 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
     [
         (
             ("init", "x", "--from", "nope"),
-            "--from nope: no shipped profile; shipped are can-fd-arm-7, can-servo-8, canopen-6, dvrk, ",
+            "--from nope: no shipped profile; shipped are can-fd-arm-7, can-fd-motors-8, can-motors-8, ",
         ),
         (("init", "x", "--period", "0us"), "--period 0us: must be between 0.001 and 1e+09 us"),
         (("init", "x", "--from", "paper-1ms", "--axes", "8"), "--from: goes without --axes: a copy has the values"),

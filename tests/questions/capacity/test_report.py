@@ -27,6 +27,7 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
         "short by": "20 us, +/- 6",
         "fastest period": "553 us as set; 433 us with bus.gap_count = 7",
         "cure": "bus.gap_count = 7, which leaves 46 us",
+        "buses": "2 such buses, of 1 node or fewer",
         "largest part": "execution, 147 us",
         "largest doubt": "execution time, 54 % of the variance",
         "not included": "host time, the slowest execution",
