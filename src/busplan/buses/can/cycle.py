@@ -25,7 +25,15 @@ from busplan.buses.can.frames import (
     streams,
     traffic_of,
 )
-from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
+from busplan.buses.can.waiting import (
+    before_the_last,
+    counted,
+    message_responses,
+    responses,
+    sent_in,
+    sync_response,
+    waits,
+)
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import COVERAGE, EventKind
@@ -306,12 +314,23 @@ class CanCycle(BusCycle):
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _, goes_before in self._before:
-            of_node = rounded_up((window_us + message.jitter_us) / message.period_us)
+            of_node = rounded_up((window_us + self._jitter_us(message)) / message.period_us)
             of_node = of_node if is_off(message.burst - 1) else of_node + message.burst - 1
             yield choose(goes_before, _of_all(message, of_node), 0)
 
+    def _jitter_us(self, message: Message) -> Number:
+        """How late a message comes to the frames of the cycle; from a queue, as late as that offers it [us]."""
+        if not self.traffic.queues or message.name == REPEATED:
+            return message.jitter_us
+
+        words = f"how late {message.name} may come, or its queue offers it"
+        return self.traffic.ask(lambda traffic: before_the_last(traffic, self._due, message.name)[1], words=words)
+
     def _goes_before_last(self, message: Message) -> Number:
         """Whether a message goes before the last of SYNC and all PDOs."""
+        if self.traffic.queues:
+            words = "the queue of SYNC or of a PDO may hold a larger identifier, and this goes before that"
+            return self.traffic.ask(lambda traffic: before_the_last(traffic, self._due, message.name)[0], words=words)
         if message.identifier_bits is self.traffic.identifier_bits:
             return message.identifier <= self._last
 
@@ -339,6 +358,14 @@ class CanCycle(BusCycle):
         if not self._is_disturbed or not self.traffic.has_cycle:
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
+
+    def possible_us(self) -> Number:
+        """What queues add that are not by priority: the test of such queues is sufficient, not exact [us]."""
+        if not self.traffic.queues:
+            return 0.0
+        by_priority = CanCycle(self.network, self.model, self.number, repeated=self.repeated)
+        by_priority.traffic = replace(self.traffic, queues=frozenset())
+        return larger(self.required_us - by_priority.required_us, 0.0)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time and longer FD frames, by half of what they change; and the host's own time."""
@@ -370,12 +397,18 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """Each node offers its highest message first, and how often an error repeats a frame."""
+        """The order of queues, and how often an error repeats a frame."""
+        bus, groups = self.network.profile.bus, self.network.groups
+        orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
+        known = sorted(order for order in orders if order is not None)
+        queues = f"queues: {' and '.join(known)}" if known else ""
+        if None in orders:
+            queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
         if is_off(self.traffic.error_burst):
-            return "priority queues: assumed", "no repeated frames"
+            return queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
         at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return "priority queues: assumed", f"repeated frames: {at_once}1 every {period_us:g} us"
+        return queues, f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -417,7 +450,7 @@ class CanCycle(BusCycle):
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """The load of what is allowed, and the message that comes closest to its deadline."""
+        """Load beside its limit, and the message that comes closest to its deadline."""
         most = self.network.profile.limits.max_load
         words = f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed"
         if self.traffic.has_rates:

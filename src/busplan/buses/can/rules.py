@@ -9,7 +9,16 @@ from typing import Final
 
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
-from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, repeated, streams, traffic_of
+from busplan.buses.can.frames import (
+    NOT_BY_PRIORITY,
+    Points,
+    Stream,
+    Traffic,
+    last_identifier,
+    repeated,
+    streams,
+    traffic_of,
+)
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
@@ -61,10 +70,34 @@ def _deadline(network: Network) -> Number:
     return _slowest(traffic_of(network).longest)
 
 
-def _late_part(network: Network) -> Number:
-    """Part of that which the bits that FD frames may take in addition make [1]."""
+def _perhaps_late(network: Network) -> Number:
+    """What longer FD frames may add to the largest response over deadline, and a queue that is not by priority [1].
+
+    Of such a queue it is all but J + C of each message.
+    """
+
+    def surely(traffic: Traffic) -> Number:
+        own = (stream for stream in streams(traffic) if stream.is_message)
+        share: Number = reduce(larger, ((one.jitter_us + one.frame_us) / one.deadline_us for one in own))
+        return share
+
     traffic = traffic_of(network)
-    return 0.0 if traffic.longest is traffic else _slowest(traffic.longest) - _slowest(traffic)
+    if traffic.queues:
+        return _deadline(network) - traffic.ask(surely, words="J + C over D of all messages")
+    return 0.0 if traffic.longest is traffic else _deadline(network) - _slowest(traffic)
+
+
+def _unknown_senders(network: Network) -> list[str]:
+    """Messages without a sender on a bus where some queue is not by priority: what they wait for is not known."""
+    profile = network.profile
+    orders = [profile.bus.queue, *(group.node.queue for group in network.groups)]
+    if not any(order in NOT_BY_PRIORITY for order in orders):
+        return []
+    return [message.name for message in profile.message if message.sender is None and not message.per_node]
+
+
+def _senders_words(network: Network) -> str:
+    return f"{first_of(_unknown_senders(network), 3)}: who sends it is not known, so neither what waits in its queue"
 
 
 def _kept_from_us(network: Network, *, is_shown: bool) -> float:
@@ -261,13 +294,22 @@ LIMITS: Final = (
         way_out="known periods have room",
     ),
     Limit(
+        "senders",
+        _senders_words,
+        lambda network: len(_unknown_senders(network)),
+        lambda _network: 0,
+        doubt=lambda _network: 0.0,
+        perhaps=lambda network: len(_unknown_senders(network)),
+        way_out="give message.NAME.sender",
+    ),
+    Limit(
         "deadline",
         _deadline_words,
         _deadline,
         lambda _network: 1,
-        way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         doubt=lambda _network: 0.0,
-        perhaps=_late_part,
+        perhaps=_perhaps_late,
+        way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         period=lambda limit, network: _kept_from_us(network, is_shown=limit.perhaps is None),
         has_rule=True,
         is_slow=True,
@@ -285,7 +327,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Two senders use one identifier: a problem for each key that sets those of the second."""
+    """Two senders use one identifier: a problem at each key that sets the identifiers of the second."""
     # Groups that the network joins have keys of their own.
     groups = [
         group._replace(nodes=nodes.nodes, members=(nodes,))
@@ -305,7 +347,7 @@ def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
         if us < inf:
             why = f"its worst-case response time is {us:g} us, over its {message.deadline_us:g} us"
         else:
-            before = [stream for stream in streams(traffic) if stream.block <= message.last_place]
+            before = [stream for stream in streams(traffic) if stream.block <= message.end_place]
             errors = [repeated(before, traffic)] if traffic.error_burst else []
             load = sum(stream.frames_us / stream.period_us for stream in (*before, *errors))
             these = "it and repeated frames" if errors else "it"

@@ -6,6 +6,7 @@ from math import ceil, inf
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
+from busplan.buses.emulation import Emulator
 from busplan.buses.ethercat.cycle import (
     EVENTS,
     LAST_BYTE,
@@ -337,6 +338,12 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         from busplan.buses.ethercat.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, progress=progress)
+
+    def emulator(self) -> Emulator:
+        """Captures of the master's port."""
+        from busplan.buses.ethercat.emulated import EMULATOR  # as above
+
+        return EMULATOR
 
 
 BUS = Ethercat()
