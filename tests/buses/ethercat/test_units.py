@@ -126,6 +126,16 @@ def test_a_domain_costs_a_header_and_a_task_a_frame_of_groups_that_are_alike_too
     assert deciding(profile(groups, starts=[starts, "", ""])).required_us == one
 
 
+@pytest.mark.parametrize(("size", "frames"), [(474, 1), (475, 2)])
+def test_the_header_of_a_domain_takes_room_of_the_frame(size: int, frames: int) -> None:
+    # 1486 bytes of data with one header; the second header takes 12 of them.
+    plan = profile([(1, 1, 1000, 0), (1, 1, size, 0)], starts=["", "datagram"])
+    result = deciding(plan)
+    assert result.own["frames"] == frames
+    drawn_us = sum(event.duration_us for event in busplan.timeline(plan).cycle_events if event.term)
+    assert drawn_us == pytest.approx(result.required_us, rel=1e-12)
+
+
 @settings(max_examples=30)
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans(), st.lists(STARTS, min_size=5, max_size=5))
 def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
