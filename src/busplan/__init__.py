@@ -23,6 +23,7 @@ __all__ = [
     "CircleTestAnswer",
     "CompareAnswer",
     "DiffAnswer",
+    "EmulateAnswer",
     "EvidenceAnswer",
     "ExplainAnswer",
     "ExploreAnswer",
@@ -42,6 +43,7 @@ __all__ = [
     "circle_test",
     "compare",
     "diff",
+    "emulate",
     "evidence",
     "explain",
     "explore",
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
     from busplan.questions.circle import CircleTestAnswer, circle_test
     from busplan.questions.compare import CompareAnswer, compare
     from busplan.questions.diff import DiffAnswer, diff
+    from busplan.questions.emulate import EmulateAnswer, emulate
     from busplan.questions.evidence import EvidenceAnswer, evidence
     from busplan.questions.explain import ExplainAnswer, explain
     from busplan.questions.explore import ExploreAnswer, explore

@@ -15,6 +15,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "calibrate": busplan.calibrate,
     "measured": busplan.measured,
     "map": busplan.map_,
+    "emulate": busplan.emulate,
     "explore": busplan.explore,
     "sweep": busplan.sweep,
     "compare": busplan.compare,
@@ -36,11 +37,17 @@ NO_QUESTION = {
     "manual": "pages of the reference",
     "profiles": "a list of files",
 }
-WITH_THEIR_UNIT = {"period": "period_us", "payload": "payload_bytes", "from": "from_us", "to": "to_us"}
+WITH_THEIR_UNIT = {
+    "period": "period_us",
+    "duration": "duration_us",
+    "payload": "payload_bytes",
+    "from": "from_us",
+    "to": "to_us",
+}
 """Parameter of an option whose value has its unit; every other one has the option's name."""
 OPTIONS_ALONE: Mapping[str | tuple[str, str], str] = {
     "set": "load_profile(profile, changes=...)",
-    **{(name, "period"): "the same" for name in ("timeline", "map", "explore", "compare", "report")},
+    **{(name, "period"): "the same" for name in ("emulate", "timeline", "map", "explore", "compare", "report")},
     "all": "rows and columns on a terminal",
     "format": "save(path) goes by the ending",
     "output": "save(path)",

@@ -81,8 +81,8 @@ def edited(tmp_path: Path) -> Path:
 
 
 def test_every_command_that_reads_a_profile_is_tried_here() -> None:
-    # `measured` is tried beside its recordings.
-    assert {*EVERY, *WITHOUT_PROFILE, "measured"} == set(COMMANDS)
+    # `measured` is tried beside its recordings, `emulate` with its own kinds of bus.
+    assert {*EVERY, *WITHOUT_PROFILE, "measured", "emulate"} == set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", EVERY)

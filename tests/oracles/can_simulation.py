@@ -1,15 +1,17 @@
 """An event simulation of a CAN bus with a SYNC cycle, as an oracle: it imports nothing of busplan.
 
 Every sender queues its frames; whenever the bus is free, the queued frame with the smallest identifier goes, and
-nothing interrupts it. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind
+nothing interrupts it. A sender whose queue is not by priority offers one of its frames at a time: the first that came,
+or any of them. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind
 SYNC, the host queues all commands some time behind the last feedback, and a node executes its command some time behind
 its last frame. Other messages are queued whenever the caller says. An error breaks the frame that is on the bus, which
 stays queued, and holds the bus for a while. Times are whole numbers of any unit.
 """
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from heapq import heappop, heappush
+from random import Random
 from typing import Final, NamedTuple
 
 
@@ -44,6 +46,8 @@ class SimulatedMessage(NamedTuple):
     frame: Frame
     due_us: tuple[int, ...]
     queued_us: tuple[int, ...]
+    sender: Hashable = None
+    """Who has it in a queue: `HOST`, the number of a node, or any other device."""
 
 
 class Run(NamedTuple):
@@ -63,6 +67,10 @@ class Run(NamedTuple):
     """End of each frame."""
 
 
+HOST: Final = "host"
+_BY_PRIORITY: Final[Mapping[Hashable, Random | None]] = {}
+
+
 def simulate(
     sync: Frame,
     nodes: Sequence[SimulatedNode],
@@ -73,6 +81,7 @@ def simulate(
     late_us: int = 0,
     errors_us: Sequence[int] = (),
     error_us: int = 0,
+    orders: Mapping[Hashable, Random | None] = _BY_PRIORITY,
 ) -> Run:
     """Run as many cycles as there are host times.
 
@@ -90,8 +99,11 @@ def simulate(
         A frame that is queued so long behind the start of another still takes part in its arbitration.
     errors_us, error_us
         Instants of errors, ascending, and how long each holds the bus. Those without a frame on the bus do nothing.
+    orders
+        Senders whose queue is not by priority: None where it is first in, first out, else what draws any of it.
     """
     bus = _Bus(sync, nodes, messages, period_us, host_us)
+    bus.orders = orders
     bus.run(late_us, errors_us, error_us)
     return Run(
         tuple(bus.ends),
@@ -129,6 +141,9 @@ class _Bus:
         self.queue: list[tuple[int, int, int, tuple[int, ...]]] = []
         """When each frame is queued, its identifier, its time, and whose it is."""
         self.frame_ends: list[int] = []
+        self.orders = _BY_PRIORITY
+        self.waiting: dict[Hashable, list[tuple[int, int, tuple[int, ...]]]] = {}
+        """Frames of a queue that is not by priority, beside the one that it offers."""
         for cycle in range(cycles):
             self.put(cycle * period_us, sync, SYNC, cycle)
         for number, message in enumerate(messages):
@@ -139,6 +154,39 @@ class _Bus:
         """Queue a frame."""
         heappush(self.queue, (when_us, frame.identifier, frame.us, owner))
 
+    def sender(self, sort: int, *whose: int) -> Hashable:
+        """Who has a frame in its queue."""
+        if sort == MESSAGE:
+            return self.messages[whose[0]].sender
+        return whose[1] if sort == FEEDBACK else HOST
+
+    def offered(self, frame: tuple[int, int, tuple[int, ...]]) -> bool:
+        """Whether a queued frame takes part in the arbitration at once; else it waits for others of its sender."""
+        sender = self.sender(*frame[2])
+        if sender not in self.orders:
+            return True
+        waiting = self.waiting.get(sender)
+        if waiting is None:
+            self.waiting[sender] = []
+            return True
+        waiting.append(frame)
+        return False
+
+    def next_of(self, owner: tuple[int, ...]) -> list[tuple[int, int, tuple[int, ...]]]:
+        """What a queue offers behind a frame that has gone."""
+        sender = self.sender(*owner)
+        if sender not in self.orders:
+            return []
+        waiting, random = self.waiting[sender], self.orders[sender]
+        if not waiting:
+            del self.waiting[sender]
+            return []
+        if random is None:
+            return [waiting.pop(0)]
+        # Frames of one identifier stay in their order.
+        drawn = random.choice(waiting)[0]
+        return [waiting.pop(next(place for place, frame in enumerate(waiting) if frame[0] == drawn))]
+
     def run(self, late_us: int, errors_us: Sequence[int], error_us: int) -> None:
         """Send every frame: whenever the bus is free, that of the smallest identifier."""
         errors = deque(errors_us)
@@ -148,7 +196,9 @@ class _Bus:
             if not pending:
                 now_us = max(now_us, self.queue[0][0])
             while self.queue and self.queue[0][0] <= now_us + late_us:
-                heappush(pending, heappop(self.queue)[1:])
+                frame = heappop(self.queue)[1:]
+                if self.offered(frame):
+                    heappush(pending, frame)
             while errors and errors[0] < now_us:
                 errors.popleft()
             if errors and errors[0] < now_us + pending[0][1]:
@@ -156,6 +206,8 @@ class _Bus:
                 continue
             _, us, (sort, *whose) = heappop(pending)
             now_us += us
+            for frame in self.next_of((sort, *whose)):
+                heappush(pending, frame)
             self.frame_ends.append(now_us)
             _ARRIVED[sort](self, now_us, *whose)
 

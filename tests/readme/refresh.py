@@ -1,4 +1,4 @@
-"""Write what the program prints today into the README and the manual: output blocks, tables, example profile, picture.
+"""Write what the program prints today into the README and the manual: output blocks, tables, pictures.
 
     python tests/readme/refresh.py
 
@@ -50,13 +50,12 @@ def refreshed(page: str, tests: ModuleType) -> str:
     for lines in tests.tables():
         old = tests.shown_table(lines[0], page)
         page = page.replace(old, "".join(f"{line}\n" for line in lines)) if old else page
-    example = (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
-    first = re.compile(r"(`paper-4ms`, as it ships:\n\n```toml\n).*?(^```$)", re.MULTILINE | re.DOTALL)
-    return str(first.sub(lambda match: f"{match[1]}{example}{match[2]}", page))
+    return page
 
 
 if __name__ == "__main__":
     tests = checks()
     for path, page in tests.PAGES.items():
         path.write_text(refreshed(page, tests), encoding="utf-8")
-    output_of(f"busplan map gantry-24 -o {tests.FOLDER / 'gantry-24.svg'}")
+    for name, command in tests.pictures().items():
+        output_of(command.replace(name, str(tests.FOLDER / name)))

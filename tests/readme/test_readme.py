@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -14,7 +14,9 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
+import busplan
 from busplan.buses import kind_named, kind_names
+from busplan.buses.figure import Figure
 from busplan.cli import app
 from busplan.forms.markdown import code, table
 from busplan.manual import FOLDER, topics
@@ -37,6 +39,9 @@ CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 MAX_WIDTH = 130
 MOST_README_BYTES = 8_192
+GALLERY = FOLDER / "commands.md"
+MOST_PICTURE_BYTES = 150_000
+"""They ship with the package."""
 
 
 @pytest.fixture(autouse=True)
@@ -60,12 +65,30 @@ def test_output_blocks_are_the_programs_own(shell: Run, command: str, output: st
     assert run.stdout + run.stderr == output
 
 
-def test_the_readme_is_short_and_its_picture_is_the_tool_s_own(shell: Run, tmp_path: Path) -> None:
+def pictures() -> dict[str, str]:
+    """The command that draws each picture of the gallery, by the picture's file name."""
+    commands = re.findall(r"^(busplan .* (\S+\.svg))$", PAGES[GALLERY], re.MULTILINE)
+    return {name: command for command, name in commands}
+
+
+def test_the_readme_is_short_and_shows_a_picture_of_the_gallery() -> None:
     assert len(PAGES[README].encode()) <= MOST_README_BYTES
     (picture,) = re.findall(r'<img src="([^"]+)"', PAGES[README])
-    (command,) = re.findall(r"`(busplan map gantry-24 -o (?:\S+\.svg))`", PAGES[README])
+    assert (ROOT / picture).parent == FOLDER
+    assert f"`{pictures()[Path(picture).name]}`" in PAGES[README]
+
+
+@pytest.mark.parametrize(("name", "command"), pictures().items())
+def test_a_picture_is_what_its_command_draws(shell: Run, name: str, command: str, tmp_path: Path) -> None:
     shell(command, cwd=tmp_path)
-    assert (tmp_path / command.split()[-1]).read_bytes() == (ROOT / picture).read_bytes()
+    assert (tmp_path / name).read_bytes() == (FOLDER / name).read_bytes()
+
+
+def test_the_gallery_shows_every_picture_in_words_too_and_all_are_small() -> None:
+    shown = re.findall(r'^<img src="(\S+)" width="100%" alt="[^"]{20,}">$', PAGES[GALLERY], re.MULTILINE)
+    assert shown == list(pictures())
+    assert sorted(shown) == sorted(path.name for path in FOLDER.glob("*.svg"))
+    assert sum((FOLDER / name).stat().st_size for name in shown) <= MOST_PICTURE_BYTES
 
 
 def test_the_commands_for_a_machine_run_as_they_stand(shell: Run, tmp_path: Path) -> None:
@@ -86,7 +109,7 @@ def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_there_are_blocks_to_check() -> None:
     commands = {command.split()[1] for command, _ in shown_runs()}
-    assert commands >= {"capacity", "latency", "circle-test", "paper", "init", "rule"}
+    assert commands >= {"capacity", "latency", "explain", "paper", "init", "rule"}
 
 
 def sections(annotation: Any) -> list[type[BaseModel]]:
@@ -110,9 +133,11 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
             (group,) = models_of(field.annotation)
             owns = [one for one in ("name", "nodes", "axes", "hops") if one in group.model_fields]
             yield from (reference_row(group, own, f"group.NAME.{own}") for own in owns)
-            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | As there, for its nodes |"
+            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | As there, for its nodes |"
+        elif name == "grades":
+            yield f"| `{key}.KEY` | {grades(inner[0])} | How servo.KEY is known, where not as servo.grade says |"
         elif inner == [AxisOverride]:
-            yield f"| `{key}` | any key of one axis | none | {field.description} |"
+            yield f"| `{key}` | any key of one axis | {field.description} |"
         elif inner:
             for one in inner:
                 yield from reference(one, f"{key}.")
@@ -120,18 +145,24 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
             yield reference_row(model, name, key)
 
 
+def grades(model: type[BaseModel]) -> str:
+    """What each key of a section of grades takes; all take the same."""
+    (values,) = {allowed(schema) for schema in properties(model).values()}
+    return values
+
+
 def reference_row(model: type[BaseModel], name: str, key: str) -> str:
-    """One row of the reference."""
+    """One row of the reference, without the unit that the key ends in."""
     field = model.model_fields[name]
-    default = (
-        "required"
-        if field.default is PydanticUndefined
-        else "required, without groups"
-        if key == "bus.nodes"
-        else repr(field.default).replace("'", '"').replace("False", "false").replace("True", "true")
-    )
-    range_ = allowed(properties(model)[name])
-    return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
+    values = allowed(properties(model)[name])
+    if key == "bus.nodes":
+        values = f"{values}, required without groups"
+    elif field.default is PydanticUndefined:
+        values = f"{values}, required"
+    elif field.default is not None:
+        values = f"{values} ({json.dumps(field.default)})"
+    meaning = re.sub(r" \[[^]]*\]$", "", field.description or "")
+    return f"| `{key}` | {values} | {meaning} |"
 
 
 @cache
@@ -154,71 +185,90 @@ def allowed(schema: dict[str, Any]) -> str:
     if schema["type"] == "string":
         letters = " of letters, digits, - and _" if schema.get("pattern", "").startswith("^[A-Za-z]") else ""
         return f"text up to {schema['maxLength']} characters{letters}"
-    low = f"> {schema['exclusiveMinimum']:g}" if "exclusiveMinimum" in schema else f"{schema['minimum']:g}"
-    kind = "whole " if schema["type"] == "integer" else ""
-    return f"{kind}{low} to {schema['maximum']:g}"
+    return number(schema)
+
+
+MOST = 1_000_000
+"""Largest values from here on are left to the JSON Schema."""
+
+
+def number(schema: dict[str, Any]) -> str:
+    """Range of a number in words."""
+    whole = "whole " if schema["type"] == "integer" else ""
+    if schema.get("minimum", 0) <= -MOST:
+        return f"{whole}number"
+    least = f"> {schema['exclusiveMinimum']:g}" if "exclusiveMinimum" in schema else f"{schema['minimum']:g}"
+    return f"{whole}{least} " + (f"to {schema['maximum']:g}" if schema["maximum"] < MOST else "or more")
 
 
 SHOWN_FIRST = "ieee1394"
-"""The kind whose keys and figures the pages of every kind show; a further kind shows what it has beside them."""
+"""The kind whose keys and figures the pages show; the page of a further kind shows what keys it has beside them."""
 
 
 def constants_table(kind: str) -> list[str]:
-    """Constants of a kind that nobody has published; `explain` has all of them."""
-    keys = ("unit", "grade", "source", "meaning")
+    """Constants of a kind that nobody has published; `explain` has all of them, with their sources."""
     cells = [
-        [code(row["name"]), short(row["value"]), *(row[key] for key in keys)]
+        [code(row["name"]), f"{short(row['value'])} {row['unit']}".removesuffix(" 1"), row["grade"], row["meaning"]]
         for row in constant_rows(kind_named(kind))
         if row["grade"] != "published"
     ]
-    return table([f"constant of `{kind}`", "value", *keys], cells, left=6)
+    return table([f"constant of `{kind}`", "value", "grade", "meaning"], cells, left=4)
+
+
+def figure_table(head: str, figures: Iterable[Figure]) -> list[str]:
+    """What figures mean; their keys end in the unit, and `explain` shows their symbols."""
+    cells = ([code(figure.key), figure.meaning, figure.reference] for figure in figures)
+    return table([head, "meaning", "reference"], cells, left=3)
 
 
 def further_tables(kind: str) -> Iterator[list[str]]:
-    """What a further kind of bus has of its own: keys, constants, and figures of `capacity` and `latency`."""
+    """What a further kind of bus has of its own: keys and constants; `explain` lists its figures."""
     known = set(reference(kind_named("ieee1394").profile_model()))
     own = [row for row in dict.fromkeys(reference(kind_named(kind).profile_model())) if row not in known]
-    yield [f"| key of `{kind}` | values | default | meaning |", "|---|---|---|---|", *own]
+    yield [f"| key of `{kind}` | values (default) | meaning |", "|---|---|---|", *own]
     yield constants_table(kind)
-    first = figures_of(kind_named(SHOWN_FIRST))
-    for command in ("capacity", "latency"):
-        described = (
-            [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
-            for key, one in figures_of(kind_named(kind))[command].items()
-            if one != first[command].get(key)
-        )
-        head = [f"{code(command)} of `{kind}`", "symbol", "unit", "meaning", "reference", "better"]
-        yield table(head, described, left=6)
+
+
+OTHER_FIGURE = "other figure"
+
+
+@cache
+def explained_keys() -> frozenset[str]:
+    """Figures of the page's kind that `explain` lists, with their meaning."""
+    return frozenset(figure.key for _, figure in busplan.explain("paper-4ms").figures)
 
 
 def tables() -> Iterator[list[str]]:
     """Every table of the program's own data, by its lines; the first of them is in one page alone."""
     yield [
-        "| key | values | default | meaning |",
-        "|---|---|---|---|",
+        "| key | values (default) | meaning |",
+        "|---|---|---|",
         *dict.fromkeys(reference(kind_named("ieee1394").profile_model())),
     ]
-    rows = equation_rows()
-    yield table(
-        list(rows[0]),
-        ([row["reference"], code(row["formula"]), code(row["function"]), row["source"]] for row in rows),
-        left=4,
+    equations = (
+        [row["reference"], code(row["formula"]), re.sub("Paper, section |, equations? [^;]*", "", row["source"])]
+        for row in equation_rows()
     )
+    yield table(["equation", "formula", "section of the paper"], equations, left=3)
     yield constants_table(SHOWN_FIRST)
-    for command, figures in (*figures_of(kind_named("ieee1394")).items(), ("circle-test", CIRCLE_BY_KEY)):
-        described = (
-            [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
-            for one in figures.values()
-        )
-        yield table([code(command), "symbol", "unit", "meaning", "reference", "better"], described, left=6)
+    explained = explained_keys()
+    figures = {
+        figure.key: figure
+        for register in figures_of(kind_named(SHOWN_FIRST)).values()
+        for figure in register.values()
+        if figure.key not in explained
+    }
+    yield figure_table(OTHER_FIGURE, figures.values())
+    yield figure_table("`circle-test`", CIRCLE_BY_KEY.values())
     for kind in kind_names():
         if kind != SHOWN_FIRST:
             yield from further_tables(kind)
 
 
 def shown_table(head: str, page: str) -> str:
-    """A page's table with this first line; empty where it has none."""
-    found = re.search(f"^{re.escape(head)}\n(?:\\|.*\n)*", page, re.MULTILINE)
+    """A page's table whose first line begins with the same cell; empty where it has none."""
+    cell = head.split("|")[1]
+    found = re.search(f"^\\|{re.escape(cell)}\\|.*\n\\| ?:?-.*\n(?:\\|.*\n)*", page, re.MULTILINE)
     return found[0] if found else ""
 
 
@@ -228,22 +278,27 @@ def test_tables_are_those_of_the_program() -> None:
         assert found.splitlines() == lines
 
 
-def test_the_command_that_a_page_names_has_all_constants() -> None:
+def test_the_command_that_a_page_names_has_all_constants_and_the_kind_s_own_figures() -> None:
     named = [re.findall(r"`busplan explain (\S+) --format json`", text) for text in PAGES.values()]
+    first = figures_of(kind_named(SHOWN_FIRST))
     kinds = []
-    for name in (one for names in named for one in names):
-        done = CliRunner().invoke(app, ["explain", name, "--format", "json"])
+    for name in (name for names in named for name in names):
+        document = json.loads(CliRunner().invoke(app, ["explain", name, "--format", "json"]).stdout)
         kinds.append(load(name).profile.bus.kind)
-        assert json.loads(done.stdout)["constants"] == constant_rows(kind_named(kinds[-1]))
+        assert document["constants"] == constant_rows(kind_named(kinds[-1]))
+        listed = {(row["command"], row["figure"]) for row in document["figures"]}
+        for command, figures in figures_of(kind_named(kinds[-1])).items():
+            assert {(command, key) for key, figure in figures.items() if figure != first[command].get(key)} <= listed
     assert sorted(kinds) == sorted(kind_names())
 
 
-def test_the_example_profile_is_the_shipped_one() -> None:
-    blocks = re.findall(r"^```toml\n(.*?)^```$", PAGES[FOLDER / "profile.md"], re.MULTILINE | re.DOTALL)
-    groups, example = blocks
-    assert example == (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
+def test_the_groups_shown_are_those_of_the_shipped_profile() -> None:
+    (groups,) = re.findall(r"^```toml\n(.*?)^```$", PAGES[FOLDER / "profile.md"], re.MULTILINE | re.DOTALL)
     above, _, _ = load("gantry-24").document.text.partition("# The groups stand")
-    assert [one.name for one in validate(decode(f"{above}{groups}".encode(), name="page")).group] == ["drives", "io"]
+    assert [group.name for group in validate(decode(f"{above}{groups}".encode(), name="page")).group] == [
+        "drives",
+        "io",
+    ]
 
 
 DOCUMENTS = {
@@ -284,14 +339,13 @@ def keys_of(document: object) -> Iterator[str]:
 
 
 def figure_keys() -> str:
-    """First cells of the tables of figures, whose keys mean the same in every document."""
-    pages = (PAGES[FOLDER / "models.md"], PAGES[FOLDER / "circle.md"])
-    return "".join(
-        re.match(r"\|[^|]*\|", row)[0]  # type: ignore[index]
-        for command in ("capacity", "latency", "circle-test")
-        for page in pages
-        for row in shown_table(f"| `{command}` | symbol | unit | meaning | reference | better |", page).splitlines()
+    """Keys of figures, which mean the same in every document: those of `explain`, and first cells of the tables."""
+    tables_of_figures = (
+        shown_table(f"| {OTHER_FIGURE} |", PAGES[FOLDER / "models.md"]),
+        shown_table("| `circle-test` |", PAGES[FOLDER / "circle.md"]),
     )
+    rows = (row for shown in tables_of_figures for row in shown.splitlines())
+    return "".join(row.split("|")[1] for row in rows) + "".join(map("`{}`".format, explained_keys()))
 
 
 def json_section(command: str) -> str:
@@ -314,7 +368,7 @@ def test_every_json_key_is_listed(command: str) -> None:
 def test_every_command_with_a_document_is_listed() -> None:
     listed = re.findall(r"^### (.*)$", PAGES[FOLDER / "json.md"], re.MULTILINE)
     assert listed == list(DOCUMENTS)
-    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init", "import"}
+    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init", "import", "emulate"}
 
 
 def test_every_link_resolves() -> None:

@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.cycle import BusCycle
+from busplan.buses.emulation import Emulator
 from busplan.buses.figure import BusFigures
 from busplan.buses.limits import (
     ANY_PERIOD,
@@ -174,7 +175,7 @@ class Bus(ABC):
         channel
             Of a recording of several channels, the name of the one that is compared.
         progress
-            Called with the bytes read and those of the file.
+            Called with the bytes read and the size of the file [bytes].
 
         Raises
         ------
@@ -183,6 +184,10 @@ class Bus(ABC):
         """
         latencies = "; latencies in a CSV file are for busplan calibrate" if self.calibration else ""
         raise BusplanError(f"{path}: no recording of bus.kind {self.kind} is read{latencies}")
+
+    def emulator(self) -> Emulator | None:
+        """What it emulates, imported only here; None if it writes no recordings."""
+        return None
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""

@@ -75,7 +75,7 @@ class Run(NamedTuple):
     """
 
     def events_us(self) -> Iterator[tuple[str, Number]]:
-        """Term and duration of each event of a single round, those of 0 left out [us]."""
+        """Term and duration of each event of a single round, without events of no duration [us]."""
         return ((event.term, event.us) for event in self.events if not is_off(event.us))
 
     def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
@@ -223,6 +223,10 @@ class BusCycle(ABC):
     def bias_us(self) -> Number | None:
         """Mean time that the bus takes in addition to the timing model [us]; None where it is unknown."""
         return None
+
+    def possible_us(self) -> Number:
+        """Part of the cycle that is only possible: without it, a cycle that fits is not shown not to fit [us]."""
+        return 0.0
 
     def sync_jitter_us(self) -> Number:
         """Jitter of the synchronous packet due to the traffic of the cycle, +/- about its mean [us]."""

@@ -6,10 +6,10 @@ are in this module; a kind of bus adds its own.
 
 from collections.abc import Callable, Iterable
 from functools import cache
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses import time_slice
-from busplan.sourced import EQUATIONS
+from busplan.sourced import EQUATIONS, read_toml
 
 Sort = Literal["number", "count", "truth", "word", "words"]
 """Sort of a figure's values."""
@@ -299,6 +299,29 @@ CERTAINTY: Final = (
 """Figures of the timing model that decides; no other model has them."""
 TRANSACTION: Final = Figure("transaction", "kind", "profile", "what is timed", sort="word")
 PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
+
+
+_OF_EVERY_BUS: Final = by_key(figure for figure in tuple(globals().values()) if isinstance(figure, Figure))
+
+
+def read_figures(package: str) -> dict[str, tuple[Figure, ...]]:
+    """Figures of a package's `figures.toml`, by group: a table of a group has the fields of a figure, by its key.
+
+    An empty table stands for the figure of every bus with that key; `decimals = "all"` for as many as a number has.
+
+    Parameters
+    ----------
+    package
+        The package.
+    """
+    groups = read_toml(package, "figures.toml")
+    return {name: tuple(_read_figure(*row) for row in rows.items()) for name, rows in groups.items()}
+
+
+def _read_figure(key: str, fields: dict[str, Any]) -> Figure:
+    if fields.get("decimals") == "all":
+        fields["decimals"] = None
+    return Figure(key, **fields) if fields else _OF_EVERY_BUS[key]
 
 
 class BusFigures(NamedTuple):

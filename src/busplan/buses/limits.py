@@ -104,6 +104,8 @@ class Limit(NamedTuple):
     role: Literal["cycle", "safety", "period"] = "cycle"
     """cycle: a part of the verdict. safety: not a part of the verdict, but no advice breaks it. period: depends on the
     period alone, and a plan chooses no period that breaks it."""
+    place: str = "cycle.period_us"
+    """Key at which the rule of the verdict reports it."""
     has_rule: bool = False
     """Whether a rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
     is_slow: bool = False

@@ -241,6 +241,18 @@ class Recorded(NamedTuple):
     shows_nothing: tuple[str, ...] = ()
     """Why the recording as a whole cannot show that the machine keeps its plan, a sentence each; empty where it can."""
 
+    def unless_synthetic(self, synthetic: str) -> "Recorded":
+        """The same, where no emulation is the recording's origin; else nothing of it is measured or shown.
+
+        Parameters
+        ----------
+        synthetic
+            What the recording says of an emulation; empty where it says of none.
+        """
+        if not synthetic:
+            return self
+        return self._replace(edits={}, shows_nothing=(f"{synthetic}; no machine was recorded", *self.shows_nothing))
+
 
 def day_of(time_ns: int) -> str:
     """Day of a stamp in nanoseconds since 1970; empty if the clock counts from another start.

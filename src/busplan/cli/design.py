@@ -1,7 +1,8 @@
-"""Commands that design a machine: plan, calibrate, measured, map, compare and import."""
+"""Commands that design a machine: plan, calibrate, measured, emulate, map, compare and import."""
 
 import shlex
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, suppress
 from functools import partial
 from itertools import chain, product
@@ -23,6 +24,7 @@ from busplan.cli.options import (
     ProfileArgument,
     load_changed,
     option,
+    output_option,
     parse_axis,
     require_company,
     takes_changes,
@@ -33,11 +35,12 @@ from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.english import printable
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
-from busplan.forms import ENDINGS, Form
+from busplan.forms import ENDINGS, Form, ending_expected
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_separate
 
 if TYPE_CHECKING:
     from busplan.profile.document import LoadedProfile
+    from busplan.questions.base.answer import Answer
     from busplan.questions.calibrate import CalibrateAnswer
     from busplan.questions.measured import MeasuredAnswer
     from busplan.questions.plan import PlanAnswer
@@ -64,7 +67,7 @@ def plan_command(
         option(
             "--axes N",
             "Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes.  [default: "
-            "those of the nodes]",
+            "the axes of the nodes]",
             min=1,
             max=_MAX_AXES,
         ),
@@ -203,8 +206,8 @@ def _choices(result: "PlanAnswer") -> dict[str, object]:
     return {key: whole(value) for key, value in (result.recommended_changes or {}).items()}
 
 
-def _say_report(changes: KeyChanges, result: "PlanAnswer") -> None:
-    """Write the report to standard error: standard output has the profile."""
+def _say_report(changes: KeyChanges, result: "Answer") -> None:
+    """Write the report to standard error: standard output has a document."""
     from busplan.forms.terminal import block_lines
     from busplan.questions.base.sentences import changed_report
 
@@ -360,10 +363,67 @@ def measured_command(
             plan = changes.applied(loaded.profile)
             seen = measured(plan, recording, quantile=quantile, channel=channel, progress=progress)
         if apply and not seen.edits:
-            raise BusplanError(f"--apply: {recording} shows no value of a key")
+            why = f": {'; '.join(seen.shows_nothing)}" if seen.shows_nothing else ""
+            raise BusplanError(f"--apply: {recording} shows no value of a key{why}")
         if apply:
             _write_edits(loaded, changes, seen, words=", ".join(seen.edits))
         give(seen.report(applied_to=profile if apply else None))
+
+
+@takes_changes("For a machine that differs from its plan.", period=True)
+def emulate_command(
+    profile: ProfileArgument,
+    cycles: Annotated[int | None, option("--cycles N", "Length of the recording, in cycles.  [default: 1000]")] = None,
+    duration: Annotated[
+        str | None, option("--duration TIME", "The same as a time with its unit.  [default: --cycles]")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        option(
+            "--fault NAME[=VALUE]",
+            "A fault of the machine; may be repeated. VALUE is how often it happens, as lost-frame=3, or how late, as "
+            "jitter=50us.  [default: 5 times, a share of the period]",
+        ),
+    ] = None,
+    seed: Annotated[int, option("--seed N", "Of jitter and data: the same gives the same bytes.  [default: 1]")] = 1,
+    changes: KeyChanges = NO_CHANGES,
+    output: Annotated[Path | None, output_option("Write the recording to FILE.pcapng, FILE.log or .candump")] = None,
+) -> None:
+    """Write the recording that the planned machine would give, so that software is tried before the machine exists.
+
+    EtherCAT gives a capture of the master's port, pcapng, and CAN a log of candump. The file says that it is synthetic:
+    nothing is measured by it. Faults of EtherCAT: missing-cycle, lost-frame, wrong-working-counter, jitter. Faults of
+    CAN: missing-cycle, missing-pdo, double-pdo, late-command, jitter, error-frame. Exits 0 when it is written.
+
+    Example: busplan emulate can-servo-8 --fault late-command -o log.candump
+    """
+    require_apart({"--output": output}, inputs=profile_files(profile))
+    from busplan.questions.emulate import emulate, emulator_of
+
+    plan = load_changed(profile, changes)
+    faults, endings, *_ = emulator_of(plan)
+    if output is not None and output.suffix.lower() not in endings:
+        raise BusplanError(f"--output {output}: {ending_expected(output.suffix, endings)}")
+    if output is None and ".pcapng" in endings and sys.stdout.isatty():
+        raise BusplanError("a capture is not for a terminal; give -o FILE.pcapng, or use a pipe")
+    length_us = None if duration is None else time_us(duration, option="--duration")
+    units = {known.name: known.unit for known in faults}
+    given = dict(_fault(text, units) for text in fault or [])
+    with ExitStack() as files:
+        file = None if output is None else files.enter_context(new_file(output, overwrite=True))
+        made = emulate(plan, cycles=cycles, duration_us=length_us, seed=seed, fault=given)
+        write_document(made.content, file)
+    if output is not None:
+        say(f"wrote {output}")
+    _say_report(changes, made)
+
+
+def _fault(text: str, units: Mapping[str, str]) -> tuple[str, Any]:
+    """Name and value of a --fault: a number of times, or a time [us]; None without a value."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if units.get(name) == "us" and value:
+        return name, time_us(value, option=f"--fault {name}")
+    return name, int(value) if value.isdecimal() else value or None
 
 
 def _direction(name: str, *, default: str) -> Any:
@@ -481,8 +541,8 @@ def compare_command(
 ) -> None:
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
-    The kinds are those of the paper: IEEE 1394, CAN, SERCOS, and the field buses whose master polls (PROFIBUS and
-    WorldFIP, the Factory Instrumentation Protocol, of which a new profile has PROFIBUS); beside them EtherCAT.
+    The kinds are the paper's, IEEE 1394, CAN, SERCOS and polled buses (PROFIBUS, WorldFIP), and
+    EtherCAT; a new profile of a polled bus is PROFIBUS.
 
     The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
     On its own kind the profile stays as it is. On another kind it gets the bus of a new profile, which is assumed; keys

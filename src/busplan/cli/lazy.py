@@ -102,7 +102,7 @@ def _of_kind(params: list[Any], kind: str) -> list[Any]:
 SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
-        "Design": ("init", "import", "plan", "calibrate", "measured", "map", "explore", "sweep", "compare"),
+        "Design": ("init", "import", "plan", "calibrate", "measured", "emulate", "map", "explore", "sweep", "compare"),
         "Analyse": ("capacity", "latency", "circle-test", "timeline", "explain", "report"),
         "Gate": ("check", "diff", "rule", "schema"),
         "Learn": ("manual", "profiles", "evidence", "paper"),

@@ -36,7 +36,7 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     broken = limits_behind(deciding, subject.network)
     unreported = [limit for limit in broken if not limit.has_rule]
     for limit in unreported:
-        yield RuleProblem("cycle.period_us", limit.words(subject.network), limit.way_out)
+        yield RuleProblem(limit.place, limit.words(subject.network), limit.way_out)
     if not unreported and (TIME in deciding.exceeded or not broken):
         yield RuleProblem("cycle.period_us", f"the cycle {overrun(deciding)}", *subject.cure())
 
@@ -49,7 +49,7 @@ def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     for limit in limits_behind(deciding, subject.network):
         if not limit.has_rule:
             words = limit.words(subject.network)
-            yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", limit.way_out)
+            yield RuleProblem(limit.place, f"not shown to fit: {words}", limit.way_out)
     if TIME in (deciding.not_shown or ()):
         words = overrun(deciding)
         if reserve:

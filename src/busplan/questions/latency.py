@@ -294,7 +294,7 @@ def _by_transaction(
 def _by_models(
     table: Sequence[Transaction], figures: Sequence[Figure]
 ) -> Iterator[tuple[list[str], list[Transaction]]]:
-    """Transactions of each timing model; of models with the same figures those of the first, under the names of all."""
+    """Transactions of each timing model; models with the same figures share one entry under all their names."""
     of_model: dict[str, list[Transaction]] = {}
     for transaction in table:
         of_model.setdefault(transaction.timing_model, []).append(transaction)

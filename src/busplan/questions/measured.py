@@ -153,7 +153,7 @@ def measured(
     channel
         Of a log of several channels, the name of the one that is compared.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Returns
     -------

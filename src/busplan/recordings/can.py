@@ -19,6 +19,7 @@ from busplan.extras import require_extra
 from busplan.progress import Progress
 from busplan.recordings.capture import SOCKETCAN, CaptureNotes, is_capture, packets
 from busplan.recordings.statistics import Floats
+from busplan.recordings.written import SYNTHETIC
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
 _ROW: Final = Struct("<dIQBB")
@@ -91,6 +92,8 @@ class CanFrames(NamedTuple):
     """Number of remote frames, which are among the n, and of error frames, which are not."""
     broken: str
     """Why the log ends early; empty for a whole one."""
+    synthetic: str = ""
+    """What the log says of an emulation; empty where it says of none."""
 
 
 def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> CanFrames:
@@ -103,7 +106,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
     channel
         Of several channels, the name of the one that is read.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -226,6 +229,7 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_Captured
             )
         if len(notes.interfaces) > 1:
             raise BusplanError(f"{path}: has frames of {len(notes.interfaces)} interfaces; export those of one bus")
+    log.synthetic = notes.synthetic
     if notes.broken_at is not None:
         log.broken = f"damaged at byte {notes.broken_at:,}"
 
@@ -275,7 +279,7 @@ class _Log:
         self._rows = bytearray()
         self._channels: Counter[object] = Counter()
         self._errors = 0
-        self.broken = ""
+        self.broken = self.synthetic = ""
 
     def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
         """Take all messages in."""
@@ -338,6 +342,7 @@ class _Log:
             int(np.count_nonzero(remote)),
             self._errors,
             self.broken,
+            self.synthetic or f"{SYNTHETIC} by the name of its channel" * (SYNTHETIC in self._channels),
         )
 
 

@@ -14,9 +14,11 @@ from typing import BinaryIO, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from busplan.english import printable
 from busplan.errors import BusplanError
 from busplan.files import is_unwritten_pipe
 from busplan.progress import Progress
+from busplan.recordings.written import SYNTHETIC
 
 Numbers = npt.NDArray[np.int64]
 _PIECE_BYTES: Final = 4_000_000
@@ -40,10 +42,12 @@ _PCAP: Final = {
 _SECTION: Final = b"\x0a\x0d\x0d\x0a"
 _ORDER: Final = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
 _INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _STATISTICS, _PACKET = 1, 2, 3, 5, 6
-_RESOLUTION, _OFFSET = 9, 14
-"""Options of an interface: the tick of its stamps, and the seconds to add."""
+_COMMENT, _RESOLUTION, _OFFSET = 1, 9, 14
+"""Options: comment of a section; of an interface the tick of its stamps, and the seconds to add."""
 _DROPPED: Final = {_PACKET: (4,), _STATISTICS: (5, 7)}
 """Options of a block that count dropped packets: before a packet; by the interface, and by the operating system."""
+_MOST_WORDS: Final = 200
+"""Bytes of a comment that are read."""
 _NOT_COUNTED: Final = 0xFFFF
 """Value of an old packet block that did not count dropped packets."""
 
@@ -71,6 +75,8 @@ class CaptureNotes:
     """Packets that the recorder says it dropped; a pcap file does not count them."""
     interfaces: set[int] = field(default_factory=set)
     """Numbers of the interfaces of a pcapng file that its packets are of."""
+    synthetic: str = ""
+    """What its comment, or its frames, say of an emulation; empty where it is of a machine."""
     broken_at: int | None = None
     """Offset of the damage in the file, from which nothing is read; None for a whole file."""
 
@@ -92,7 +98,7 @@ def packets(path: Path, notes: CaptureNotes, *, link: int = ETHERNET, progress: 
     link
         Link type of the packets that are read.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -216,7 +222,9 @@ class _PcapNg(_Walker):
                 break
             if at + size > len(content):
                 break
-            if not is_section:
+            if is_section:
+                self._find_mark(content[at + 24 : at + size - 4])
+            else:
                 self._block(rows, kind, content, at, size)
             at += size
         return rows, at
@@ -260,6 +268,13 @@ class _PcapNg(_Walker):
             for code, value in self._options(options)
             if code in _DROPPED[kind] and len(value) == number.size
         )
+
+    def _find_mark(self, options: bytes) -> None:
+        """Note what the comment of a section says of an emulated recording."""
+        for code, value in self._options(options):
+            text = printable(value[:_MOST_WORDS].decode("utf-8", "replace"))
+            if code == _COMMENT and text.startswith(f"{SYNTHETIC}:"):
+                self._notes.synthetic = text
 
     def _options(self, content: bytes) -> Iterator[tuple[int, bytes]]:
         """Code and value of each option."""

@@ -12,6 +12,7 @@ from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, packets
+from busplan.recordings.written import SYNTHETIC, SYNTHETIC_PORT
 
 _TYPE: Final = 0x88A4
 _VLAN: Final = (0x8100, 0x88A8)
@@ -92,7 +93,7 @@ def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
     path
         A pcap or pcapng file.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -205,6 +206,8 @@ class _Reader:
                 f"{path}: has frames of {len(self._masters)} masters: {named}; keep the frames of one, as in Wireshark "
                 "with the filter eth.src"
             )
+        if int.from_bytes(SYNTHETIC_PORT) in self._masters:
+            notes.synthetic = notes.synthetic or f"{SYNTHETIC} by the address of its port"
         times, returned, keys, counters = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         layouts = tuple(map(_datagrams_of, self._layouts))
         layout = np.array(self._layout_of_key, dtype=np.int64)[keys]

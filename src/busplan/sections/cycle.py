@@ -317,7 +317,7 @@ class Limits(Section):
 
     reserve: Annotated[float, Field(ge=0, le=0.99, allow_inf_nan=False)] = Field(
         default=0.0,
-        description="Share of the time slice that must be free for a cycle to be shown to fit, 0..0.99",
+        description="Share of the time slice that must be free for a cycle to be shown to fit",
         examples=[0.15],
     )
 

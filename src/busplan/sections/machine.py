@@ -218,9 +218,8 @@ class CircleSection(Section):
 
     path: Literal["trapezoid", "iso230-4"] = Field(
         default="trapezoid",
-        description="The move: one circle with both ramps on it, as the paper has it, or a lead-in until the loops "
-        "have settled and then one whole turn that is measured, as ISO 230-4 has it; only the latter has a circular "
-        "deviation G",
+        description="trapezoid: one circle with both ramps on it (the paper); iso230-4: a lead-in until the loops have "
+        "settled, then one whole turn that is measured. Only iso230-4 has a circular deviation G",
         examples=["iso230-4"],
     )
     radius_mm: Annotated[float, Field(ge=1e-3, le=MAX_LENGTH_MM, allow_inf_nan=False)] = Field(

@@ -193,9 +193,57 @@ def test_a_message_says_whether_it_is_fd() -> None:
         bus=FD,
     )
     us = {name: phases(own)[name]["frame_us"] for name in ("classical", "fd", "long")}
-    assert us == {"classical": 135, "fd": 32 + 115 / 5, "long": pytest.approx(56 + 520 / 5)}
+    late = 2  # delimiter and acknowledge of two bits each
+    assert us == {"classical": 135, "fd": 32 + 115 / 5 + late, "long": pytest.approx(56 + 520 / 5 + late)}
     # The first 11 bits of the long identifier are 0; the FD message blocks.
-    assert responses(own)["classical"] == us["long"] + us["fd"] + 39 + 6 * us["fd"] + us["classical"]
+    assert responses(own)["classical"] == us["long"] + us["fd"] + 39 + late + 6 * us["fd"] + us["classical"]
+
+
+def late_by_two_bits(**sections: Any) -> busplan.Profile:
+    """Three nodes and a message on CAN FD: SYNC and six PDOs a cycle."""
+    return profile(message("fd", 0x300, fd=True, **sections.pop("message", {})), bus=FD, **sections)
+
+
+def test_two_more_bits_of_each_fd_frame_are_a_doubt_of_the_cycle() -> None:
+    wide = figures(late_by_two_bits())
+    (late,) = (doubt for doubt in wide.doubts if doubt.key == "fd_late_bits")
+    # SYNC, the PDOs and two frames that block are 2 us longer each; U is twice the doubt.
+    assert (late.us, wide.verdict) == (1 + 6 + 2, "fits")
+    for verdict, us in (("fits", 0.01), ("not shown to fit", -0.01)):
+        own = late_by_two_bits(cycle={"period_us": wide.safe_required_us + us}, limits={"max_load": 0.99})
+        assert figures(own).verdict == verdict
+    assert all(doubt.key != "fd_late_bits" for doubt in figures(profile(message("own", 0x300))).doubts)
+
+
+def test_load_and_deadline_are_kept_with_two_more_bits_and_broken_without() -> None:
+    own = late_by_two_bits()
+    load, us = figures(own).own["bus_load"], responses(own)["fd"]
+    longest, before_us = load + 2 * (7 / 8000 + 1 / 1e5), 2 * (7 + 1)
+    for verdict, most in (
+        ("fits", longest + 1e-6),
+        ("not shown to fit", longest - 1e-6),
+        ("does not fit", load - 1e-6),
+    ):
+        assert figures(late_by_two_bits(limits={"max_load": most})).verdict == verdict
+    assert us is not None
+    ends_us = (("fits", us), ("not shown to fit", us - 0.1), ("does not fit", us - before_us - 0.1))
+    for verdict, deadline_us in ends_us:
+        assert figures(late_by_two_bits(message={"deadline_us": deadline_us})).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("key", "share", "code"), [("limits.max_load", 0.1, "BP121"), ("message.fd.deadline_us", 1, "BP123")]
+)
+def test_the_gate_reports_what_two_more_bits_leave_open(
+    run: Run, tmp_path: Path, key: str, share: float, code: str
+) -> None:
+    own = late_by_two_bits()
+    most = figures(own).own["bus_load"] + 1e-5 if share < 1 else (responses(own)["fd"] or 0) - 0.1
+    path = tmp_path / "own.toml"
+    path.write_text(text_of(busplan.load_profile(own, changes={key: most})))
+    answer = run("check", "--no-circle", str(path))
+    assert answer.returncode == 1
+    assert code in answer.stdout
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ one.
 """
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from math import inf, lcm
 from random import Random
 from typing import Final, NamedTuple
@@ -50,6 +50,8 @@ class Message(NamedTuple):
     data_bit_rate: int = 0
     """Of CAN FD; 0 of a classical frame [kbit/s]."""
     burst: int = 1
+    sender: str = ""
+    """The host, a group, or another device; empty where each node sends it, or nobody else is known."""
 
 
 class Group(NamedTuple):
@@ -77,6 +79,8 @@ class Traffic(NamedTuple):
     """Of SYNC and PDOs as frames of CAN FD; 0 of classical ones."""
     errors: tuple[int, int] = (0, 0)
     """Mean time from one error to the next, and how many come at once; 0 without errors."""
+    orders: tuple[tuple[str, str], ...] = ()
+    """Senders whose queues are not by priority, each with its order; others have queues by priority."""
 
     @property
     def nodes(self) -> int:
@@ -101,6 +105,8 @@ class Traffic(NamedTuple):
             data_bit_rate_kbit_s=rate,
             is_stuffed=True,
         )
+        # Nodes far apart make delimiter and acknowledge of an FD frame two bits long each.
+        us += 2 * 1000 / self.bit_rate if rate else 0
         return Frame(int(word.ljust(32, "0"), 2), int(us))
 
     @property
@@ -134,6 +140,29 @@ class Traffic(NamedTuple):
             for node in range(message.senders)
         ]
 
+    @property
+    def queues(self) -> list[int | str]:
+        """The queue that each sender of each message has it in: the host's, a node's by its number, a device's."""
+        first = [sum(group.nodes for group in self.groups[:place]) for place in range(len(self.groups))]
+        groups = {f"g{place}": number for place, number in enumerate(first)}
+        return [
+            node if message.senders > 1 else groups.get(message.sender, message.sender)
+            for message in self.messages
+            for node in range(message.senders)
+        ]
+
+    def drawn(self, seed: int) -> dict[Hashable, Random | None]:
+        """Queues that are not by priority, each with what draws from it."""
+        orders, number = dict(self.orders), 0
+        found: dict[Hashable, str] = {}
+        for place, group in enumerate(self.groups):
+            for _ in range(group.nodes):
+                found[number] = orders.get(f"g{place}", "priority")
+                number += 1
+        found |= {name: orders.get("others", "priority") for name in ("host", "device", "another")}
+        draw = {"fifo": None, "single-buffer": Random(seed)}
+        return {name: draw[order] for name, order in found.items() if order in draw}
+
     def profile(self, period_us: float) -> busplan.Profile:
         """A profile of it."""
         bus = {"kind": "can", "bit_rate_kbit_s": self.bit_rate, "sync_identifier": self.sync_identifier}
@@ -143,12 +172,15 @@ class Traffic(NamedTuple):
         if self.errors[0]:
             bus |= {"error_period_us": self.errors[0], "error_burst": self.errors[1]}
         execution = {"kind": "linear", "grade": "measured", "base_us": self.read_us, "per_byte_us": 0}
+        orders = dict(self.orders)
+        bus["queue"] = orders.get("others", "priority")
         groups = [
             {
                 "name": f"g{place}",
                 "nodes": group.nodes,
                 "axes": 1,
                 "every": group.every,
+                "queue": orders.get(f"g{place}", "priority"),
                 "execution": execution,
                 **dict(zip(("read_bytes", "write_bytes"), group.sizes, strict=True)),
                 **dict(zip(("feedback_identifier", "command_identifier"), group.identifiers, strict=True)),
@@ -168,6 +200,7 @@ class Traffic(NamedTuple):
                 "jitter_us": message.jitter_us,
                 "deadline_us": message.deadline_us,
                 "burst": message.burst,
+                **({"sender": message.sender} if message.sender else {}),
             }
             for message in self.messages
         ]
@@ -295,12 +328,26 @@ def of_errors(sent: Traffic, random: Random) -> Traffic:
     return (kind(sent, random) if kind else sent)._replace(errors=(period_us, random.choice([1, 1, 2, 3])))
 
 
+def of_queues(sent: Traffic, random: Random) -> Traffic:
+    """Traffic of any sort whose senders have queues first in, first out, or single buffers."""
+    kind = random.choice([of_both_formats, of_fd, of_rates, of_bursts, of_errors, None, None])
+    sent = kind(sent, random) if kind else sent
+    names = ["host", "device", "another", *(f"g{place}" for place in range(len(sent.groups)))]
+    messages = tuple(
+        message if message.senders > 1 else message._replace(sender=random.choice(names)) for message in sent.messages
+    )
+    order = random.choice(["fifo", "single-buffer"])
+    of_groups = [(name, order) for name in names[3:] if random.random() < 0.5]
+    return sent._replace(messages=messages, orders=(*random.choice([[], [("others", order)]]), *of_groups))
+
+
 KINDS: Final = {
     "both formats": of_both_formats,
     "CAN FD": of_fd,
     "rates": of_rates,
     "bursts": of_bursts,
     "errors": of_errors,
+    "queues": of_queues,
 }
 """What may become of random traffic of 11 bits."""
 
@@ -353,14 +400,15 @@ def run(own: Scene, at: Moments) -> Run:
             for feedback, command, reads_us, group in ways
         ],
         [
-            SimulatedMessage(frame, due, queued)
-            for (_, frame), due, queued in zip(sent.senders, at.due_us, at.queued_us, strict=True)
+            SimulatedMessage(frame, due, queued, sender)
+            for (_, frame), due, queued, sender in zip(sent.senders, at.due_us, at.queued_us, sent.queues, strict=True)
         ],
         period_us=own.period_us,
         host_us=at.host_us,
         late_us=at.late_us,
         errors_us=at.errors_us,
         error_us=ERROR_BITS * 1000 // sent.bit_rate,
+        orders=sent.drawn(at.late_us),
     )
 
 
@@ -500,7 +548,8 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "first", "networks"), [*((kind, 0, 60) for kind in KINDS if kind != "errors"), ("errors", 1300, 80)]
+    ("kind", "first", "networks"),
+    [*((kind, 0, 60) for kind in KINDS if kind not in ("errors", "queues")), ("errors", 1300, 80), ("queues", 0, 150)],
 )
 def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str, first: int, networks: int) -> None:
     best = attacked(first, networks, runs=150, kind=kind)

@@ -9,6 +9,7 @@ from statistics import fmean, stdev
 from typing import Any
 
 import pytest
+import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -259,6 +260,52 @@ def test_a_command_must_be_taken_before_sync0(jitter_us: float, verdict: str, ke
     assert of(profile(bus__master_jitter_us=jitter_us)).verdict == "fits"
     late = of(profile(bus__distributed_clocks=True, bus__master_jitter_us=jitter_us, bus__sync_shift=0.0))
     assert (late.verdict, late.own["sync0_us"]) == ("fits", 500)
+
+
+def test_each_drive_has_its_own_window_about_sync0() -> None:
+    """A drive with a narrow window breaks no wide one, and the sentence names the drive that decides."""
+    drive = {"nodes": 2, "read_bytes": 8, "write_bytes": 8}
+    wide, narrow = {**drive, "name": "wide", "sync_window_us": 100.0}, {**drive, "name": "narrow"}
+
+    def card(window_us: float | None, jitter_us: float, *, clocks: bool = True) -> dict[str, Any]:
+        groups = (wide, {**narrow, "sync_window_us": window_us})
+        plan = grouped(*groups, distributed_clocks=clocks, master_jitter_us=jitter_us)
+        (verdict,) = busplan.capacity(plan, timing_model="last-byte").to_dict()["verdicts"]
+        return {"verdict": verdict["verdict"], **{line["label"]: line["text"] for line in verdict["lines"]}}
+
+    assert card(None, 80)["verdict"] == "fits"
+    assert card(50, 40)["verdict"] == "fits"
+    unknown = card(50, 0)
+    assert unknown["verdict"] == "not shown to fit"
+    assert unknown["limit"] == (
+        "narrow: frames move 0.0 us against SYNC0 without the jitter, which is not given, and a drive allows 50 us: "
+        "a jitter of 50.0 us is allowed"
+    )
+    assert card(50, 70)["verdict"] == "does not fit"
+    assert card(50, 70, clocks=False)["verdict"] == "fits"
+    assert card(200, 130)["limit"].startswith("wide: frames move 130.0 us against SYNC0")
+
+
+def test_sensitivity_says_how_much_jitter_a_window_still_allows() -> None:
+    plan = profile(bus__distributed_clocks=True, bus__master_jitter_us=20.0, node__sync_window_us=50.0)
+    (sensitivity,) = busplan.capacity(plan, sensitivity=True).sensitivities
+    (jitter,) = (reach for reach in sensitivity.reaches if reach.key == "bus.master_jitter_us")
+    assert jitter.limited_by == ("sync_window",)
+    assert jitter.most == pytest.approx(50, rel=0.01)
+
+
+def test_the_gate_sends_a_window_to_the_jitter_and_not_to_the_period(run: Any, tmp_path: Path) -> None:
+    for jitter_us, code, words in (
+        (70.0, "BP101", "frames move 70.0 us"),
+        (0.0, "BP114", "which is not given"),
+    ):
+        path = tmp_path / f"{code}.toml"
+        plan = profile(bus__distributed_clocks=True, bus__master_jitter_us=jitter_us, node__sync_window_us=50.0)
+        path.write_text(tomli_w.dumps(plan.model_dump(exclude_unset=True, exclude_none=True)))
+        said = run("check", "--no-circle", str(path)).stdout
+        assert f"{code} error: bus.master_jitter_us: " in said
+        assert words in said
+        assert "a jitter of 50.0 us is allowed" in said
 
 
 def test_the_smallest_period_keeps_commands_before_sync0() -> None:

@@ -22,7 +22,9 @@ Rated = tuple[int, int, int, int]
 """Rate, devices, inputs and outputs of a group."""
 
 
-def profile(groups: Sequence[Rated], *, units: str = "spread", axes: int = 0, **bus: Any) -> busplan.Profile:
+def profile(
+    groups: Sequence[Rated], *, units: str = "spread", axes: int = 0, starts: Sequence[str] = (), **bus: Any
+) -> busplan.Profile:
     return (
         kind_named("ethercat")
         .profile_model()
@@ -42,6 +44,7 @@ def profile(groups: Sequence[Rated], *, units: str = "spread", axes: int = 0, **
                         "axes": axes,
                         "port": "E-bus",
                         "execution": EXECUTION,
+                        "starts": (starts[place] if starts else None) or None,
                     }
                     for place, (every, nodes, read, write) in enumerate(groups)
                 ],
@@ -50,30 +53,41 @@ def profile(groups: Sequence[Rated], *, units: str = "spread", axes: int = 0, **
     )
 
 
-def frames_of_cycle(groups: Sequence[Rated], first: Sequence[int], cycle: int, *, clocks: bool) -> list[int]:
+def frames_of_cycle(
+    groups: Sequence[Rated], first: Sequence[int], cycle: int, *, clocks: bool, starts: Sequence[str] = ()
+) -> list[int]:
     """Bytes on the wire of each frame of a cycle: devices in their order, a new frame where the next has no room."""
-    sizes = [
-        read + write
-        for (every, nodes, read, write), start in zip(groups, first, strict=True)
+    devices = [
+        (read + write, what if number == 0 else "")
+        for (every, nodes, read, write), start, what in zip(groups, first, starts or [""] * len(groups), strict=True)
         if (cycle - start) % every == 0
-        for _ in range(nodes)
+        for number in range(nodes)
     ]
+    return frames_of_sizes([size for size, _ in devices], clocks=clocks, starts=[what for _, what in devices])
+
+
+def frames_of_sizes(sizes: Sequence[int], *, clocks: bool = True, starts: Sequence[str] = ()) -> list[int]:
+    """Bytes on the wire of each frame of devices in their order, some of which start a datagram or a frame."""
     held = 20 if clocks else 0
     has_data, frames = False, []
-    for size in sizes:
-        more = size + 12 * (not has_data)
-        if held + more > 1538 - 40:
+    for size, what in zip(sizes, starts or [""] * len(sizes), strict=True):
+        more = size + 12 * (not has_data or what == "datagram")
+        if held + more > 1538 - 40 or (has_data and what == "frame"):
             frames.append(held)
             held, more = 0, size + 12
         held, has_data = held + more, True
     return [max(84, 40 + frame) for frame in (*frames, held) if frame]
 
 
-def written_us(groups: Sequence[Rated], first: Sequence[int], *, clocks: bool) -> list[float]:
+def written_us(
+    groups: Sequence[Rated], first: Sequence[int], *, clocks: bool, starts: Sequence[str] = ()
+) -> list[float]:
     """What each cycle of the common multiple needs [us]."""
     way_us = 20 + E_BUS_US * sum(nodes for _, nodes, _, _ in groups)
     cycles = range(lcm(*(every for every, *_ in groups)))
-    return [way_us + BYTE_US * sum(frames_of_cycle(groups, first, cycle, clocks=clocks)) for cycle in cycles]
+    return [
+        way_us + BYTE_US * sum(frames_of_cycle(groups, first, cycle, clocks=clocks, starts=starts)) for cycle in cycles
+    ]
 
 
 def placed(groups: Sequence[Rated], units: str) -> list[int]:
@@ -100,20 +114,84 @@ GROUPS = st.lists(
     min_size=1,
     max_size=5,
 )
+STARTS = st.sampled_from(["", "", "datagram", "frame"])
+
+
+@pytest.mark.parametrize(("starts", "more_us"), [("datagram", 12 * BYTE_US), ("frame", (40 + 12) * BYTE_US)])
+def test_a_domain_costs_a_header_and_a_task_a_frame_of_groups_that_are_alike_too(starts: str, more_us: float) -> None:
+    groups = [(1, 10, 12, 12)] * 3
+    one, each = (deciding(profile(groups, starts=what)).required_us for what in (["", "", ""], ["", starts, starts]))
+    assert each - one == pytest.approx(2 * more_us, rel=1e-9)
+    # What begins with the first group begins there anyway.
+    assert deciding(profile(groups, starts=[starts, "", ""])).required_us == one
 
 
 @settings(max_examples=30)
-@given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
+@given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans(), st.lists(STARTS, min_size=5, max_size=5))
 def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
-    groups: list[Rated], units: str, clocks: bool
+    groups: list[Rated], units: str, clocks: bool, starts: list[str]
 ) -> None:
-    plan = profile(groups, units=units, distributed_clocks=clocks)
-    each_us = written_us(groups, placed(groups, units), clocks=clocks)
+    starts = starts[: len(groups)]
+    plan = profile(groups, units=units, distributed_clocks=clocks, starts=starts)
+    each_us = written_us(groups, placed(groups, units), clocks=clocks, starts=starts)
     result = deciding(plan)
     assert result.required_us == pytest.approx(max(each_us), rel=1e-12)
     assert result.own["mean_utilisation"] == pytest.approx(fmean(each_us) / 500, rel=1e-12)
     events = busplan.timeline(plan).cycle_events
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
+
+
+def moved_us(groups: Sequence[Rated], first: Sequence[int], watched: int) -> float:
+    """How far the ends of a device's frame lie apart, the most of any of a group [us]: every cycle written out."""
+    ends: dict[int, list[float]] = {}
+    for cycle in range(lcm(*(every for every, *_ in groups))):
+        devices, sizes = [], []
+        for place, ((every, nodes, read, write), start) in enumerate(zip(groups, first, strict=True)):
+            if (cycle - start) % every == 0:
+                devices += [place * 1000 + number for number in range(nodes)]
+                sizes += [read + write] * nodes
+        for count, device in enumerate(devices):
+            if device // 1000 == watched:
+                # Devices behind it may fill its frame up, but need not: the frames of all, less those begun behind it.
+                before = frames_of_sizes(sizes[: count + 1])
+                ends.setdefault(device, []).append(BYTE_US * sum(frames_of_sizes(sizes)[: len(before)]))
+    return max(max(each) - min(each) for each in ends.values())
+
+
+@settings(max_examples=30)
+@given(GROUPS, st.sampled_from(["spread", "together"]), st.data())
+def test_a_frame_moves_against_sync0_as_units_make_it_longer(
+    groups: list[Rated], units: str, data: st.DataObject
+) -> None:
+    watched = data.draw(st.integers(0, len(groups) - 1))
+    us = moved_us(groups, placed(groups, units), watched)
+
+    def verdict(window_us: float, jitter_us: float = 0.0, **bus: Any) -> str:
+        plan = profile(groups, units=units, master_jitter_us=jitter_us, **{"distributed_clocks": True, **bus})
+        own = deciding(busplan.load_profile(plan, changes={f"group.g{watched}.sync_window_us": window_us}))
+        states = {"broken": own.exceeded, "not shown": own.not_shown or ()}
+        return next((state for state, keys in states.items() if "sync_window" in keys), "kept")
+
+    # The master's jitter adds to it; one that is not given may be any.
+    for jitter_us in (0.5, 10):
+        assert verdict(us + jitter_us + 1e-3, jitter_us) == "kept"
+        assert verdict(us + jitter_us - 1e-3, jitter_us) == "broken"
+    assert verdict(us + 1e3) == "not shown"
+    if us:
+        assert verdict(us - 1e-3) == "broken"
+    assert verdict(max(us / 2, 1e-3), distributed_clocks=False) == "kept"
+
+
+@pytest.mark.parametrize(("window_us", "is_kept"), [(16.001, True), (15.999, False)])
+def test_the_fullest_cycle_need_not_be_that_in_which_a_window_frame_ends_last(
+    window_us: float, *, is_kept: bool
+) -> None:
+    # 1400 bytes do not fit behind the drive's 200 in a frame; in the other cycle 200 bytes more go before it.
+    groups = [(2, 1, 100, 100), (1, 1, 100, 100), (2, 1, 1000, 400)]
+    plan = busplan.load_profile(
+        profile(groups, distributed_clocks=True, master_jitter_us=1e-6), changes={"group.g1.sync_window_us": window_us}
+    )
+    assert ("sync_window" not in deciding(plan).exceeded) == is_kept
 
 
 @settings(max_examples=10)

@@ -144,7 +144,7 @@ def test_frames_take_the_time_of_real_files(file: str, tmp_path: Path) -> None:
     answer = imported(text, tmp_path)
     assert frames_us(answer.profile) == pytest.approx(us, abs=1e-9)
     assert answer.profile.cycle.nonperiodic_us == 0
-    assert f"its frame takes {us:.2f} us on the wire, as those of the profile" in answer.remarks[-1]
+    assert f"its frame takes {us:.2f} us on the wire, as the profile has" in answer.remarks[-1]
 
 
 def test_a_value_says_its_line_and_grade(tmp_path: Path) -> None:

@@ -32,10 +32,10 @@ REFUSED = {
     "deep": ("<masters>" + "<a>" * 100_000, r":1: elements inside each other more than 64 deep"),
     "empty": ("", ": is empty"),
     "blank": ("\ufeff \n\t\n", ": is empty"),
-    "none": ("a,b\n1,2\n", r": none of what is looked for: ENI \(a root <EtherCATConfig>\); LinuxCNC's"),
-    "other XML": ("<html/>", r": XML with a root <html>, which is none of what is looked for: ENI"),
+    "none": ("a,b\n1,2\n", r": no format that busplan imports: ENI \(a root <EtherCATConfig>\); LinuxCNC's"),
+    "other XML": ("<html/>", r": XML with a root <html>, no format that busplan imports: ENI"),
     "an ESI": ("<EtherCATInfo/>", ": an ESI describes a kind of device and no machine; export the ENI"),
-    "binary": ("\0\1\2PNG" * 10, ": binary data, none of what is looked for"),
+    "binary": ("\0\1\2PNG" * 10, ": binary data, no format that busplan imports"),
     "two in one": (
         "Slave:1\n Name:a\nBO_ 256 Pressure: 8 X\n",
         r": has lines of text of SOEM's .* and DBC \(BO_\); give a",

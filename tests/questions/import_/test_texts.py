@@ -45,7 +45,7 @@ def test_an_eni_has_the_frames_and_a_scan_beside_it_the_delays() -> None:
     assert (profile.bus.master, profile.bus.process_data) == (None, "LRW-shared")
     assert profile.bus.housekeeping_bytes == (4, 4, 1, 2)
     # 40 bytes of a frame, 12 of each of five datagrams, and their data.
-    assert any("its frame takes 10.24 us on the wire, as those of the profile" in remark for remark in answer.remarks)
+    assert any("its frame takes 10.24 us on the wire, as the profile has" in remark for remark in answer.remarks)
     assert "delay_us = 0.15            # measured: cable included, slaves.txt:39" in answer.text
 
 
@@ -156,6 +156,7 @@ def test_a_database_alone_is_a_network_of_messages() -> None:
         ("Pressure", 0x100, 8, 20_000),
         ("Foreign", 0x18FEF1FE, 8, 100_000),
     ]
+    assert [each.sender for each in profile.message] == ["Drive", "Drive"]
     left_out, alone = answer.remarks
     assert left_out.endswith(": Door")
     assert alone.startswith("Messages alone, without a cycle")

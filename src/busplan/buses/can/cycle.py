@@ -25,7 +25,15 @@ from busplan.buses.can.frames import (
     streams,
     traffic_of,
 )
-from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
+from busplan.buses.can.waiting import (
+    before_the_last,
+    counted,
+    message_responses,
+    responses,
+    sent_in,
+    sync_response,
+    waits,
+)
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import COVERAGE, EventKind
@@ -87,10 +95,20 @@ class CanCycle(BusCycle):
     term_figures = TERMS
     command_events = (("command", "command_frame"),)
 
-    def __init__(self, network: Network, model: str, number: int | None = None, *, repeated: int | None = None) -> None:
+    def __init__(
+        self,
+        network: Network,
+        model: str,
+        number: int | None = None,
+        *,
+        repeated: int | None = None,
+        is_longest: bool = False,
+    ) -> None:
         self.network = network
         self.model = model
         self.number = number
+        self.is_longest = is_longest
+        """Whether FD frames take the most bits in addition."""
         self.repeated = repeated
         """Frames that are repeated in a row, if not as the profile has it [1]."""
 
@@ -122,6 +140,7 @@ class CanCycle(BusCycle):
         traffic = traffic_of(self.network)
         if self.repeated is not None:
             traffic = replace(traffic, error_burst=self.repeated)
+        traffic = traffic.longest if self.is_longest else traffic
         return traffic if self.model == WORST else replace(traffic, is_stuffed=False)
 
     def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
@@ -139,6 +158,7 @@ class CanCycle(BusCycle):
                 identifier_bits=self.traffic.identifier_bits,
                 bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
                 data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
+                late_bits=self.traffic.late_bits,
                 is_stuffed=self.traffic.is_stuffed,
             )
             return named(us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
@@ -294,12 +314,23 @@ class CanCycle(BusCycle):
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _, goes_before in self._before:
-            of_node = rounded_up((window_us + message.jitter_us) / message.period_us)
+            of_node = rounded_up((window_us + self._jitter_us(message)) / message.period_us)
             of_node = of_node if is_off(message.burst - 1) else of_node + message.burst - 1
             yield choose(goes_before, _of_all(message, of_node), 0)
 
+    def _jitter_us(self, message: Message) -> Number:
+        """How late a message comes to the frames of the cycle; from a queue, as late as that offers it [us]."""
+        if not self.traffic.queues or message.name == REPEATED:
+            return message.jitter_us
+
+        words = f"how late {message.name} may come, or its queue offers it"
+        return self.traffic.ask(lambda traffic: before_the_last(traffic, self._due, message.name)[1], words=words)
+
     def _goes_before_last(self, message: Message) -> Number:
         """Whether a message goes before the last of SYNC and all PDOs."""
+        if self.traffic.queues:
+            words = "the queue of SYNC or of a PDO may hold a larger identifier, and this goes before that"
+            return self.traffic.ask(lambda traffic: before_the_last(traffic, self._due, message.name)[0], words=words)
         if message.identifier_bits is self.traffic.identifier_bits:
             return message.identifier <= self._last
 
@@ -328,15 +359,28 @@ class CanCycle(BusCycle):
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
+    def possible_us(self) -> Number:
+        """What queues add that are not by priority: the test of such queues is sufficient, not exact [us]."""
+        if not self.traffic.queues:
+            return 0.0
+        by_priority = CanCycle(self.network, self.model, self.number, repeated=self.repeated)
+        by_priority.traffic = replace(self.traffic, queues=frozenset())
+        return larger(self.required_us - by_priority.required_us, 0.0)
+
     def doubts(self) -> tuple[Doubt, ...]:
-        """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
+        """The execution time and longer FD frames, by half of what they change; and the host's own time."""
         if not self.traffic.has_cycle:
             return ()
         swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in TRANSACTION_KINDS)
         key = "node.execution" if self.network.is_uniform else "group.execution"
         bus = self.network.profile.bus
         host_us = choose(bus.pipeline_cycles > 0, 0.0, bus.host_doubt_us)
-        return Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
+        doubts = Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
+        if self.traffic.longest is self.traffic:
+            return doubts
+        longest = CanCycle(self.network, self.model, self.number, repeated=self.repeated, is_longest=True)
+        late_us = (longest.required_us - self.required_us) / 2
+        return *doubts, Doubt("fd_late_bits", "two more bits of each FD frame", late_us)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The host's own time, the slowest execution, and what else is on the bus."""
@@ -353,12 +397,18 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """Each node offers its highest message first, and how often an error repeats a frame."""
+        """The order of queues, and how often an error repeats a frame."""
+        bus, groups = self.network.profile.bus, self.network.groups
+        orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
+        known = sorted(order for order in orders if order is not None)
+        queues = f"queues: {' and '.join(known)}" if known else ""
+        if None in orders:
+            queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
         if is_off(self.traffic.error_burst):
-            return "priority queues: assumed", "no repeated frames"
+            return queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
         at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return "priority queues: assumed", f"repeated frames: {at_once}1 every {period_us:g} us"
+        return queues, f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -400,7 +450,7 @@ class CanCycle(BusCycle):
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """The load of what is allowed, and the message that comes closest to its deadline."""
+        """Load beside its limit, and the message that comes closest to its deadline."""
         most = self.network.profile.limits.max_load
         words = f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed"
         if self.traffic.has_rates:
@@ -408,7 +458,7 @@ class CanCycle(BusCycle):
             words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
         lines = [("load", words)]
         if self._messages:
-            answers = message_responses(self.traffic)
+            answers = message_responses(self.traffic.longest)
             latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
             response = f"{_short(worst.us)} us of {_short(latest.deadline_us)}"
             words = response if worst.us < inf else "without a worst-case response time"
@@ -422,7 +472,7 @@ class CanCycle(BusCycle):
 
     def _late_with(self, repeated: int) -> str:
         """What is late, or not shown to be in time, with some repeated frames in a row; empty where nothing is."""
-        trial = CanCycle(self.network, self.model, repeated=repeated)
+        trial = CanCycle(self.network, self.model, repeated=repeated, is_longest=True)
         for message, worst in message_responses(trial.traffic, is_verdict=True):
             if not within(worst.us, message.deadline_us):
                 return message.name
@@ -434,6 +484,8 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
+        if self.model == WORST and self.traffic.longest is not self.traffic:
+            return CanCycle(self.network, WORST, self.number, is_longest=True).latencies()
         cycle = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
         names = (*cycle, *((message.name, "") for message in self.traffic.messages))
         loop = (BusLatency(LOOP, None, self._loop()),) if cycle else ()

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.figure import BusFigures, read_figures
 from busplan.elementwise import Number, choose, is_off, larger, next_entry, rounded_down, rounded_up, smaller
 from busplan.sourced import Constants
 
@@ -43,6 +43,7 @@ FD_LONG_CRC_BITS: Final = CONSTANTS["FD_LONG_CRC_BITS"]
 FD_SHORT_BYTES: Final = CONSTANTS["FD_SHORT_BYTES"]
 FD_DELIMITER_BITS: Final = CONSTANTS["FD_DELIMITER_BITS"]
 FD_FRAME_BYTES: Final = CONSTANTS["FD_FRAME_BYTES"]
+FD_LATE_BITS: Final = CONSTANTS["FD_LATE_BITS"]
 SYNC_IDENTIFIER: Final = CONSTANTS["SYNC_IDENTIFIER"]
 FEEDBACK_IDENTIFIER: Final = CONSTANTS["FEEDBACK_IDENTIFIER"]
 COMMAND_IDENTIFIER: Final = CONSTANTS["COMMAND_IDENTIFIER"]
@@ -161,6 +162,7 @@ def frame_us(
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
     data_bit_rate_kbit_s: Number = 0.0,
+    late_bits: Number = 0.0,
     is_stuffed: bool,
 ) -> Number:
     """Time of a data frame on the wire [us].
@@ -173,6 +175,8 @@ def frame_us(
         Bit rate [kbit/s]; float or array.
     data_bit_rate_kbit_s
         Data bit rate of a CAN FD frame; 0 for a classical frame [kbit/s]; float or array.
+    late_bits
+        Nominal bits by which nodes far apart make a CAN FD frame longer, 0..`FD_LATE_BITS` [bits].
 
     Examples
     --------
@@ -183,6 +187,7 @@ def frame_us(
     """
     if not is_off(data_bit_rate_kbit_s):
         nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
+        nominal = nominal if is_off(late_bits) else nominal + late_bits
         return nominal * bit_us(bit_rate_kbit_s) + data * bit_us(data_bit_rate_kbit_s)
     bits = frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
     return bits * bit_us(bit_rate_kbit_s)
@@ -195,6 +200,7 @@ def payload_us(
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
     data_bit_rate_kbit_s: Number = 0.0,
+    late_bits: Number = 0.0,
     is_stuffed: bool,
 ) -> Number:
     """Time of all frames of a payload: each is filled before the next, and the last has the rest [us].
@@ -205,7 +211,7 @@ def payload_us(
         Payload, 1 or more [bytes]; float or array.
     frame_bytes
         Most data of each frame in their order; further ones are as the last [bytes].
-    identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, is_stuffed
+    identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, late_bits, is_stuffed
         As `frame_us` takes them.
 
     Examples
@@ -221,6 +227,7 @@ def payload_us(
             identifier_bits=identifier_bits,
             bit_rate_kbit_s=bit_rate_kbit_s,
             data_bit_rate_kbit_s=data_bit_rate_kbit_s,
+            late_bits=late_bits,
             is_stuffed=is_stuffed,
         )
 
@@ -256,115 +263,17 @@ def share_bytes(payload_bytes: Number, *, pdos: Number) -> Number:
     return rounded_up(payload_bytes / pdos)
 
 
-_EQUATIONS: Final = "Davis 2007"
-BIT_RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate of the bus", "bit rate, kbit/s", decimals=None)
-BUS_LOAD: Final = Figure(
-    "bus_load",
-    "load",
-    _EQUATIONS,
-    "share of the bus that all messages take, 0..1",
-    "bus load",
-    "%",
-    decimals=2,
-    better="less",
-)
-EXPECTED_LOAD: Final = Figure(
-    "expected_load",
-    "load_expected",
-    "python-can logs",
-    "share of the bus with as many stuff bits as measured frames have, 0..1",
-    "expected load",
-    "%",
-    decimals=2,
-    better="less",
-)
-LOADS: Final = (BUS_LOAD, EXPECTED_LOAD)
-TERMS: Final = (
-    Figure("cycle_sync_us", "SYNC", _EQUATIONS, "the frame that opens a cycle", "SYNC", ink="sync", letter="S"),
-    Figure(
-        "cycle_wait_us",
-        "wait",
-        "profile",
-        "wait for the slowest node, behind SYNC and behind its command",
-        "wait for nodes",
-        ink="work",
-        letter="W",
-    ),
-    Figure("cycle_feedback_us", "feedback", _EQUATIONS, "PDOs from all nodes", "feedback", ink="in", letter="F"),
-    Figure(
-        "cycle_host_us",
-        "host",
-        "profile",
-        "the host's own time behind the last feedback",
-        "host",
-        ink="idle",
-        letter="H",
-    ),
-    Figure("cycle_command_us", "command", _EQUATIONS, "PDOs to all nodes", "command", ink="out", letter="C"),
-    Figure(
-        "cycle_blocking_us",
-        "3 B",
-        _EQUATIONS,
-        "frames of lower priorities, one before SYNC, one before the last feedback and one before the commands",
-        "blocking",
-        ink="gap",
-        letter="B",
-    ),
-    Figure(
-        "cycle_interference_us",
-        "I",
-        _EQUATIONS,
-        "other messages of higher priorities than the last PDO that arrive while the cycle lasts, and repeated frames",
-        "interference",
-        ink="contention",
-        letter="I",
-    ),
-    NONPERIODIC,
-)
-"""In the order of the wire."""
-
-LATENCY_TABLE: Final = (
-    Figure(
-        "identifier",
-        "id",
-        "profile",
-        "identifier of the last frame",
-        "identifier",
-        sort="count",
-        is_hexadecimal=True,
-    ),
-    Figure("data_bytes", "s", "profile", "data of the last frame", "data, bytes", sort="count"),
-    Figure("jitter_us", "J", "profile", "how late it may be queued", "jitter J"),
-    Figure("blocking_us", "B", _EQUATIONS, "longest frame of a lower priority", "blocking B"),
-    Figure(
-        "interference_us",
-        "I",
-        _EQUATIONS,
-        "frames of higher priorities before it, and repeated frames",
-        "interference I",
-    ),
-    Figure("instance", "q", _EQUATIONS, "worst instance of the busy period, from 0", "worst instance q", sort="count"),
-    Figure("backlog_us", "q (C - T)", _EQUATIONS, "instances before it, less their periods", "backlog q (C - T)"),
-    Figure("frame_us", "C", _EQUATIONS, "the frame itself", "frame C"),
-    Figure("execution_us", "T_exec", "profile", "waits for nodes and host, of a loop over both", "execution"),
-    Figure("pipeline_us", "n T_s", "profile", "cycles that the host computes in, of a loop over both", "host's cycles"),
-    Figure(
-        "worst_response_us",
-        "R",
-        _EQUATIONS,
-        "worst-case response time, J + B + I + q (C - T) + C; of a loop all of it, from SYNC to the executed command",
-        "response R",
-    ),
-    Figure("deadline_us", "D", "profile", "when it must have arrived", "deadline D"),
-)
-"""In the order in which they add up."""
+_FIGURES: Final = read_figures("busplan.buses.can")
+BUS_LOAD: Final = _FIGURES["loads"][0]
+TERMS: Final = _FIGURES["terms"]
+LATENCY_TABLE: Final = _FIGURES["latency"]
 FIGURES: Final = BusFigures(
     TERMS,
-    setup=(BIT_RATE,),
-    headings=(BIT_RATE.key,),
-    added=LOADS,
-    table=LOADS,
-    compared=LOADS,
+    setup=_FIGURES["setup"],
+    headings=("bit_rate_kbit_s",),
+    added=_FIGURES["loads"],
+    table=_FIGURES["loads"],
+    compared=_FIGURES["loads"],
     planned=(BUS_LOAD.key,),
     latency_rows=LATENCY_TABLE,
     has_many_transactions=True,

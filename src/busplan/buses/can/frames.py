@@ -11,6 +11,7 @@ from busplan.buses.can.equations import (
     COMMAND_IDENTIFIER,
     ERROR_BITS,
     FD_FRAME_BYTES,
+    FD_LATE_BITS,
     FEEDBACK_IDENTIFIER,
     FRAME_BYTES,
     MAX_IDENTIFIER,
@@ -25,9 +26,14 @@ from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, l
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
-"""Instead of an identifier: the next behind those of the group before."""
+"""Stands for the identifier after the last one of the group before."""
 SYNC: Final = "SYNC"
 REPEATED: Final = "repeated frames"
+HOST: Final = "host"
+NODE: Final = "node"
+"""Sender that is one of nodes that are alike; others are `HOST`, a group, or another device by its name."""
+NOT_BY_PRIORITY: Final = ("fifo", "single-buffer")
+"""Orders of a queue in which a message may wait for others of its sender, whatever their priority."""
 LOOP: Final = "loop"
 """Name of the way from SYNC to the executed commands."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
@@ -41,11 +47,11 @@ class Pdos(NamedTuple):
     kind: TransactionKind
     group: str
     identifier: Number
-    """Of the first frame of the first PDO; `FOLLOWS` for the next behind those of the group before."""
+    """Identifier of the first frame of the first PDO; `FOLLOWS` continues the group before."""
     pdos: Number
     """PDOs of all its nodes [1]."""
     payload_bytes: Number
-    """Of each PDO [bytes]."""
+    """Data of each PDO [bytes]."""
     frame_bytes: tuple[float, ...] = (FRAME_BYTES,)
     """Most data of each of its frames in their order; further ones are as the last [bytes]."""
     most_bytes: int = int(MOST_PDOS * FRAME_BYTES)
@@ -72,7 +78,7 @@ class Message(NamedTuple):
     senders: Number = 1
     """Nodes that send it, each with the identifier behind that of the node before [1]."""
     data_bit_rate_kbit_s: Number = 0.0
-    """Of an FD frame, that of the bus where it does not switch; 0 for a classical frame."""
+    """Data bit rate of an FD frame, without a switch the bit rate of the bus; 0 for a classical frame."""
     burst: Number = 1
     """Frames that may come at once [1]."""
 
@@ -84,7 +90,7 @@ class Traffic:
     period_us: Number = MAX_TIME_US
     bit_rate_kbit_s: Number
     data_bit_rate_kbit_s: Number = 0.0
-    """Of SYNC and PDOs as FD frames; 0 where they are classical."""
+    """Data bit rate of SYNC and PDOs as FD frames; 0 for classical frames."""
     identifier_bits: Number = BASE_BITS
     sync_identifier: Number = 0
     sync_bytes: Number = 0
@@ -96,10 +102,14 @@ class Traffic:
     """From one error on the wire to the next; of bursts the mean time [us]."""
     error_burst: Number = 0
     """Errors that may come at once, each of which repeats a frame; 0 without errors [1]."""
+    late_bits: Number = 0.0
+    """Nominal bits that each FD frame takes in addition [bits]."""
     pdos: tuple[Pdos, ...] = ()
     messages: tuple[Message, ...] = ()
     is_stuffed: bool = True
     """Whether frames have the stuff bits of the worst case, or none."""
+    queues: frozenset[frozenset[tuple[str, str]]] = frozenset()
+    """Streams by name and group whose frames share a queue that is not by priority."""
 
     @property
     def has_cycle(self) -> bool:
@@ -110,6 +120,12 @@ class Traffic:
     def has_rates(self) -> bool:
         """Whether some PDOs are not in every cycle."""
         return not all(is_off(pdos.every - 1) for pdos in self.pdos)
+
+    @cached_property
+    def longest(self) -> "Traffic":
+        """The same with FD frames as long as receivers accept; itself where they are so, or there are none."""
+        rates = self.data_bit_rate_kbit_s, *(message.data_bit_rate_kbit_s for message in self.messages)
+        return self if self.late_bits or all(map(is_off, rates)) else replace(self, late_bits=float(FD_LATE_BITS))
 
     def frame_us(self, data_bytes: Number, form: "Traffic | Message") -> Number:
         """Time of a frame [us].
@@ -126,6 +142,7 @@ class Traffic:
             identifier_bits=form.identifier_bits,
             bit_rate_kbit_s=self.bit_rate_kbit_s,
             data_bit_rate_kbit_s=form.data_bit_rate_kbit_s,
+            late_bits=self.late_bits,
             is_stuffed=self.is_stuffed,
         )
 
@@ -195,7 +212,7 @@ class Traffic:
         return replace(self, **cycle, pdos=tuple(pdos), messages=tuple(messages))
 
 
-_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-3]
+_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-4]
 """Its own numbers: fields before the PDOs and the messages."""
 _OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
 
@@ -221,6 +238,7 @@ def _traffic(network: Network) -> Traffic:
         error_burst=0 if bus.error_period_us is None else 1 if bus.error_burst is None else bus.error_burst,
         messages=tuple(_message(message, bus, network.nodes) for message in network.profile.message),
     )
+    alone = replace(alone, queues=frozenset(_queues(network)))
     if not groups:
         return alone
     return replace(
@@ -235,6 +253,27 @@ def _traffic(network: Network) -> Traffic:
             _pdos(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
         ),
     )
+
+
+def _queues(network: Network) -> Iterator[frozenset[tuple[str, str]]]:
+    """Streams that share a queue which is not by priority: messages of a sender, with each stream of its cycle.
+
+    Of a sender in the cycle no PDO waits for another of its own cycle: a queue of SYNC, or of PDOs, is one of its own.
+    """
+    profile, groups = network.profile, network.groups
+    group_of = {member.name or NODE: group for group in groups for member in group.members}
+    sent: dict[str, set[tuple[str, str]]] = {}
+    for message in profile.message:
+        for sender in group_of if message.per_node else (message.sender,):
+            order = group_of[sender].node.queue if sender in group_of else None
+            if sender is not None and (order or profile.bus.queue) in NOT_BY_PRIORITY:
+                sent.setdefault(sender, set()).add((message.name, ""))
+    for sender, messages in sent.items():
+        cycle = [(NAMES["read"], group_of[sender].name)] if sender in group_of else []
+        if sender == HOST and groups:
+            cycle = [(SYNC, ""), *((NAMES["write"], group.name) for group in groups)]
+        yield from (frozenset({stream, *messages}) for stream in cycle)
+        yield frozenset(messages)
 
 
 def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> Pdos:
@@ -307,6 +346,10 @@ class Stream(NamedTuple):
     is_message: bool = False
     burst: Points = 1
     """Frames of each identifier that may come at once [1]."""
+    queue_place: Points | None = None
+    """Place of the last identifier in its queue, where that is not by priority: it may wait behind that."""
+    offered_us: Points = 0.0
+    """Of a message in such a queue: the latest instant from which on it is the one that the queue offers [us]."""
 
     @property
     def last(self) -> Points:
@@ -322,6 +365,11 @@ class Stream(NamedTuple):
     def last_place(self) -> Points:
         """Place of the last identifier in the arbitration."""
         return place(self.last, self.identifier_bits)
+
+    @property
+    def end_place(self) -> Points:
+        """Place in the arbitration up to which all frames may go before its last."""
+        return self.last_place if self.queue_place is None else self.queue_place
 
     @property
     def label(self) -> str:
@@ -348,7 +396,16 @@ def streams(traffic: Traffic) -> tuple[Stream, ...]:
     traffic
         What it sends, as `Traffic.ask` gives it.
     """
-    return (*_cyclic(traffic), *(_of_message(message, traffic) for message in traffic.messages))
+    sent = (*_cyclic(traffic), *(_of_message(message, traffic) for message in traffic.messages))
+    for queue in traffic.queues:
+        end = last_place(stream for stream in sent if (stream.name, stream.group) in queue)
+        sent = tuple(
+            stream._replace(queue_place=end if stream.queue_place is None else larger(stream.queue_place, end))
+            if (stream.name, stream.group) in queue
+            else stream
+            for stream in sent
+        )
+    return sent
 
 
 def _of_message(message: Message, traffic: Traffic) -> Stream:
@@ -483,5 +540,5 @@ def last_identifier(sent: Iterable[Stream]) -> Points:
 
 
 def last_place(sent: Iterable[Stream]) -> Points:
-    """Place of the last identifier of some streams in the arbitration."""
-    return reduce(larger, (choose(stream.identifiers > 0, stream.last_place, 0) for stream in sent))
+    """Place up to which all frames may go before the last of some streams."""
+    return reduce(larger, (choose(stream.identifiers > 0, stream.end_place, 0) for stream in sent))

@@ -18,6 +18,7 @@ from busplan.buses.can.equations import (
 )
 from busplan.buses.can.frames import streams, traffic_of
 from busplan.buses.can.rules import LIMITS, RULES
+from busplan.buses.emulation import Emulator
 from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
@@ -227,6 +228,12 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, channel=channel, progress=progress)
+
+    def emulator(self) -> Emulator:
+        """Logs of candump."""
+        from busplan.buses.can.emulated import EMULATOR  # as above
+
+        return EMULATOR
 
 
 BUS: Final = Can()

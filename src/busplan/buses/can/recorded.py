@@ -60,7 +60,7 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     channel
         Of several channels, the name of the one that is compared.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -70,7 +70,8 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     frames = read_can(path, channel=channel, progress=progress)
     log = _Log(network, frames, share)
     day = day_of(int(frames.start_s * 1e9))
-    return Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))
+    compared = Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))
+    return compared.unless_synthetic(frames.synthetic)
 
 
 class DuePdos(NamedTuple):
@@ -254,7 +255,7 @@ class _Log:
         return us
 
     def _load(self) -> Iterator[RecordedFigure]:
-        """Load as it was, beside that of the plan and those of the same frames with worst and without stuff bits."""
+        """Recorded load, the planned load, and the recorded frames with the most stuff bits and with none."""
         count, is_fd = len(self.taken), self.frames.is_fd[self.taken]
         span_us = float(self.times_us[-1] - self.times_us[0])
         is_whole = self.has_switch or not self.frames.switched[self.taken].any()

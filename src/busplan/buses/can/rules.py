@@ -9,7 +9,16 @@ from typing import Final
 
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
-from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, repeated, streams, traffic_of
+from busplan.buses.can.frames import (
+    NOT_BY_PRIORITY,
+    Points,
+    Stream,
+    Traffic,
+    last_identifier,
+    repeated,
+    streams,
+    traffic_of,
+)
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
@@ -27,7 +36,7 @@ def _late_messages(traffic: Traffic) -> list[tuple[Stream, float]]:
 
 def _deadline_words(network: Network) -> str:
     """Say of all messages that miss their deadline in one clause, the worst first."""
-    late = sorted(_late_messages(traffic_of(network)), key=lambda pair: -pair[1] / pair[0].deadline_us)
+    late = sorted(_late_messages(traffic_of(network).longest), key=lambda pair: -pair[1] / pair[0].deadline_us)
     endless = [message.name for message, us in late if us == inf]
     if endless:
         return f"{first_of(endless, 1)} ha{'s' if len(endless) == 1 else 've'} no worst-case response time"
@@ -40,24 +49,61 @@ def _deadline_words(network: Network) -> str:
     )
 
 
-def _deadline(network: Network) -> Number:
-    """The largest response over deadline of any message; 0 without messages [1]."""
+def _slowest(traffic: Traffic) -> Number:
+    """The largest response over deadline of any message, `_ENDLESS` at most; 0 without messages [1]."""
 
     def slowest(traffic: Traffic) -> Number:
         answers = message_responses(traffic, is_verdict=True)
         share: Number = reduce(larger, (worst.us / message.deadline_us for message, worst in answers))
-        return share
+        return smaller(share, _ENDLESS)
 
-    if not network.profile.message:
+    if not traffic.messages:
         return 0.0
-    return traffic_of(network).ask(slowest, words="busy periods of all messages")
+    return traffic.ask(slowest, words="busy periods of all messages")
 
 
-def _kept_from_us(network: Network) -> float:
+_ENDLESS: Final = 1e6
+"""Response over deadline, from which on how late a message is says nothing [1]."""
+
+
+def _deadline(network: Network) -> Number:
+    return _slowest(traffic_of(network).longest)
+
+
+def _late_part(network: Network) -> Number:
+    """Part of that which is only possible: what FD frames take in addition, and all that queues add to J + C [1]."""
+    traffic = traffic_of(network)
+    if traffic.queues:
+        return _deadline(network) - traffic.ask(_own_share, words="J + C over D of all messages")
+    return 0.0 if traffic.longest is traffic else _slowest(traffic.longest) - _slowest(traffic)
+
+
+def _own_share(traffic: Traffic) -> Number:
+    """The largest J + C over deadline of any message, whatever it waits for [1]."""
+    messages = [stream for stream in streams(traffic) if stream.is_message]
+    share: Number = reduce(larger, ((one.jitter_us + one.frame_us) / one.deadline_us for one in messages))
+    return share
+
+
+def _unknown_senders(network: Network) -> list[str]:
+    """Messages without a sender on a bus where some queue is not by priority: what they wait for is not known."""
+    profile = network.profile
+    orders = [profile.bus.queue, *(group.node.queue for group in network.groups)]
+    if not any(order in NOT_BY_PRIORITY for order in orders):
+        return []
+    return [message.name for message in profile.message if message.sender is None and not message.per_node]
+
+
+def _senders_words(network: Network) -> str:
+    return f"{first_of(_unknown_senders(network), 3)}: who sends it is not known, so neither what waits in its queue"
+
+
+def _kept_from_us(network: Network, *, is_shown: bool) -> float:
     """The period from which on deadlines are kept; infinite where none is long enough, or without a cycle [us]."""
 
     def is_kept(period_us: float) -> bool:
-        return bool(within(_deadline(network._replace(period_us=period_us)), 1))
+        traffic = traffic_of(network._replace(period_us=period_us))
+        return bool(within(_slowest(traffic.longest if is_shown else traffic), 1))
 
     if not traffic_of(network).has_cycle:
         return inf
@@ -159,7 +205,12 @@ def _payload_words(network: Network) -> str:
 
 
 def _load(network: Network) -> Number:
-    return CanCycle(network, WORST).load
+    return CanCycle(network, WORST, is_longest=True).load
+
+
+def _late_load(network: Network) -> Number:
+    """Part of the load that the bits that FD frames may take in addition make [1]."""
+    return _load(network) - CanCycle(network, WORST).load
 
 
 def _when_full(load: float) -> str:
@@ -226,7 +277,9 @@ LIMITS: Final = (
         _load,
         lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
-        period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
+        doubt=lambda _network: 0.0,
+        perhaps=_late_load,
+        period=lambda limit, network: CanCycle(network, WORST, is_longest=limit.perhaps is None).load_period_us,
         has_rule=True,
     ),
     Limit(
@@ -239,12 +292,23 @@ LIMITS: Final = (
         way_out="known periods have room",
     ),
     Limit(
+        "senders",
+        _senders_words,
+        lambda network: len(_unknown_senders(network)),
+        lambda _network: 0,
+        doubt=lambda _network: 0.0,
+        perhaps=lambda network: len(_unknown_senders(network)),
+        way_out="give message.NAME.sender",
+    ),
+    Limit(
         "deadline",
         _deadline_words,
         _deadline,
         lambda _network: 1,
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
-        period=lambda _limit, network: _kept_from_us(network),
+        doubt=lambda _network: 0.0,
+        perhaps=_late_part,
+        period=lambda limit, network: _kept_from_us(network, is_shown=limit.perhaps is None),
         has_rule=True,
         is_slow=True,
     ),
@@ -253,15 +317,15 @@ LIMITS: Final = (
 
 def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
-    if "load" in subject.deciding.exceeded:
-        load, most = subject.deciding.own["bus_load"], subject.network.profile.limits.max_load
+    if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
+        load, most = plain(_load(subject.network)), subject.network.profile.limits.max_load
         yield RuleProblem(
             "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Two senders use one identifier: a problem for each key that sets those of the second."""
+    """Two senders use one identifier: a problem at each key that sets the identifiers of the second."""
     # Groups that the network joins have keys of their own.
     groups = [
         group._replace(nodes=nodes.nodes, members=(nodes,))
@@ -276,12 +340,12 @@ def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A message may arrive behind its deadline."""
-    traffic = traffic_of(subject.network)
+    traffic = traffic_of(subject.network).longest
     for message, us in _late_messages(traffic):
         if us < inf:
             why = f"its worst-case response time is {us:g} us, over its {message.deadline_us:g} us"
         else:
-            before = [stream for stream in streams(traffic) if stream.block <= message.last_place]
+            before = [stream for stream in streams(traffic) if stream.block <= message.end_place]
             errors = [repeated(before, traffic)] if traffic.error_burst else []
             load = sum(stream.frames_us / stream.period_us for stream in (*before, *errors))
             these = "it and repeated frames" if errors else "it"

@@ -22,7 +22,7 @@ from busplan.buses.can.equations import (
     UNMEASURED_SHARE,
     IdentifierBits,
 )
-from busplan.buses.can.frames import LOOP, NAMES, SYNC
+from busplan.buses.can.frames import HOST, LOOP, NAMES, NODE, SYNC
 from busplan.elementwise import Number
 from busplan.sections.base import (
     MAX_TIME_US,
@@ -56,6 +56,7 @@ PdoBytes = Annotated[
     Field(strict=False, min_length=1, max_length=int(MOST_PDOS)),
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
+Queue = Literal["priority", "fifo", "single-buffer"]
 _MOST_CYCLES = 1000
 
 
@@ -66,15 +67,14 @@ class CanBus(BusSection):
     bit_rate_kbit_s: BitRate = Field(description="Bit rate of the bus [kbit/s]", examples=[1000])
     data_bit_rate_kbit_s: DataBitRate | None = Field(
         default=None,
-        description="Data bit rate of CAN FD, behind the switch of bit rate: SYNC and PDOs are FD frames of up to 64 "
-        "bytes, and messages with fd = true; without it SYNC and PDOs are classical frames [kbit/s]",
+        description="Data bit rate of CAN FD; SYNC and PDOs are FD frames with it, and classical frames without it "
+        "[kbit/s]",
         examples=[5000],
     )
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[8])
     identifier_bits: IdentifierBits = Field(
         default=11,
-        description="Length of the identifiers, 11 (CAN 2.0A) or 29 (CAN 2.0B), of messages that do not say theirs "
-        "[bits]",
+        description="Length of identifiers, where a message does not say its own [bits]",
         examples=[11],
     )
     sync_identifier: Identifier = Field(
@@ -85,15 +85,13 @@ class CanBus(BusSection):
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
-        description="Cycles from the one that brings feedback to the one that takes the command computed from it; 0: "
-        "the host computes between the last feedback and the first command of a cycle. Of latency, and of a loop on "
-        "the host",
+        description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle. "
+        "For latency, and a loop on the host",
         examples=[1],
     )
     host_us: TimeUs = Field(
         default=0.0,
-        description="The host's own time between the last feedback and the queued commands; read where "
-        "pipeline_cycles is 0 [us]",
+        description="Host's time from the last feedback to the queued commands; used where pipeline_cycles is 0 [us]",
         examples=[100],
     )
     host_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
@@ -101,24 +99,30 @@ class CanBus(BusSection):
     )
     host_uncertainty_us: TimeUs | None = Field(
         default=None,
-        description="Standard uncertainty of host_us; without it 10 % of it where it is measured, else half of it [us]",
+        description="Standard uncertainty of host_us; without it 10 % where that is measured or derived, else 50 % "
+        "[us]",
         examples=[5],
+    )
+    queue: Queue | None = Field(
+        default=None,
+        description="Order in which host and nodes send what they have queued: priority, the smallest identifier "
+        "first; fifo, first in first out; single-buffer; without it priority, assumed",
+        examples=["fifo"],
     )
     error_period_us: PeriodUs | None = Field(
         default=None,
-        description="Shortest time from one error on the wire to the next, each of which repeats a frame; with "
-        "error_burst the mean time; without it no frame is repeated [us]",
+        description="Shortest time between errors, each of which repeats a frame; with error_burst the mean time; "
+        "without it no errors [us]",
         examples=[100_000],
     )
     error_burst: Count | None = Field(
         default=None,
-        description="Errors that may come at once, with as many periods to the next burst; without it 1",
+        description="Errors that may come at once, with as many periods to the next; without it 1",
         examples=[3],
     )
     timing_model: TimingModelName = Field(
         default=WORST,
-        description="Timing model whose figures lead the tables, worst-stuffing or no-stuffing; the verdict is always "
-        "by worst-stuffing",
+        description="Timing model whose figures lead the tables; the verdict is always by worst-stuffing",
         examples=[WORST],
     )
 
@@ -146,35 +150,32 @@ class CanPayload(PayloadSection):
 
     pdo_per: Literal["node", "axis"] = Field(
         default="node",
-        description="Whether a node has one PDO in each direction, or each of its axes has; they share the payload",
+        description="Whether each node or each axis has a PDO in each direction; axes share the payload",
         examples=["axis"],
     )
     every: Annotated[int, Field(ge=1, le=int(MOST_EVERY))] = Field(
         default=1,
-        description="Its PDOs go with every n-th SYNC, CANopen's transmission type n; all count from the same SYNC",
+        description="PDOs go with every n-th SYNC (CANopen's transmission type n); all count from the same SYNC",
         examples=[4],
     )
     feedback_identifier: Identifier | None = Field(
         default=None,
-        description="Identifier of the first feedback PDO, the next one has the next; a frame beyond the first of a "
-        "PDO has 256 more. Without it 0x181, of a further group the one behind those before",
+        description="Identifier of the first feedback PDO; without it 0x181, or the next one after the group before",
         examples=[0x181],
     )
     command_identifier: Identifier | None = Field(
         default=None,
-        description="Identifier of the first command PDO, as that of feedback. Without it 0x201",
+        description="Identifier of the first command PDO; without it 0x201, or the next one after the group before",
         examples=[0x201],
     )
     feedback_pdos: PdoBytes | None = Field(
         default=None,
-        description="Most data of each feedback PDO, up to 8, of CAN FD 64, whose sum is the default of read_bytes; "
-        "without it as much each [bytes]",
+        description="Data of each feedback PDO, up to 8 (CAN FD 64); their sum is the default of read_bytes [bytes]",
         examples=[[6, 6]],
     )
     command_pdos: PdoBytes | None = Field(
         default=None,
-        description="Most data of each command PDO, as those of feedback, whose sum is the default of write_bytes "
-        "[bytes]",
+        description="Data of each command PDO; their sum is the default of write_bytes [bytes]",
         examples=[[6, 6]],
     )
 
@@ -186,7 +187,15 @@ class CanPayload(PayloadSection):
         return (None, sum(lengths)) if self.pdo_per == "axis" else (sum(lengths), None)
 
 
-class CanGroup(CanPayload, GroupSection):
+class CanNode(NodeSection):
+    """Section [node]: a distributed node."""
+
+    queue: Queue | None = Field(
+        default=None, description="Order in which it sends what it has queued; without it that of the bus"
+    )
+
+
+class CanGroup(CanNode, CanPayload, GroupSection):
     """One of the sections [[group]]: nodes that are alike, in the order of their identifiers."""
 
     axes: GroupAxes = Field(examples=[4])
@@ -197,49 +206,56 @@ class CanMessage(Section):
 
     name: GroupName = Field(description="Name of the message; its keys are message.NAME.key", examples=["sdo"])
     identifier: Identifier = Field(
-        description="Its identifier; a smaller one goes first. Of each node, what its number from 1 on is added to",
+        description="Identifier; smaller ones go first. With per_node, node n has identifier + n, from 1 on",
         examples=[0x581],
     )
     identifier_bits: IdentifierBits | None = Field(
         default=None,
-        description="Length of its identifier, 11 or 29; without it that of the bus [bits]",
+        description="Length of the identifier; without it that of the bus [bits]",
         examples=[29],
     )
     per_node: bool = Field(
-        default=False, description="Whether each node sends it, in the order of the profile", examples=[True]
+        default=False, description="Whether each node sends one, in the order of the profile", examples=[True]
     )
-    fd: bool = Field(default=False, description="Whether it is a CAN FD frame, or a classical frame", examples=[True])
+    sender: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
+        default=None,
+        description=f"Who sends it: {HOST}, {NODE} for one of nodes that are alike, a group, or another device by its "
+        "name. Messages of a sender share its queue",
+        examples=[HOST],
+    )
+    fd: bool = Field(default=False, description="Whether it is a CAN FD frame", examples=[True])
     brs: bool = Field(
         default=True,
-        description="Whether its FD frame switches to bus.data_bit_rate_kbit_s; false: all of it has the bit rate of "
-        "the bus",
+        description="Whether an FD frame switches to bus.data_bit_rate_kbit_s",
         examples=[False],
     )
     payload_bytes: Annotated[int, Field(ge=0, le=int(FD_FRAME_BYTES))] = Field(
-        description="Its data, 0 to 8, of an FD frame to 64 [bytes]", examples=[8]
+        description="Data, up to 8, of an FD frame up to 64 [bytes]", examples=[8]
     )
     period_us: PeriodUs = Field(
-        description="Shortest time from one to the next; with burst the mean time [us]", examples=[10_000]
+        description="Shortest time between messages; with burst the mean time [us]", examples=[10_000]
     )
     period_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
         default=None,
-        description="How period_us is known; where one is assumed, no plan is shown to fit",
+        description="How period_us is known; with an assumed one no plan is shown to fit",
         examples=["assumed"],
     )
     burst: Count = Field(
-        default=1, description="Frames that may come at once, with as many periods to the next burst", examples=[5]
+        default=1, description="Frames that may come at once, with as many periods to the next", examples=[5]
     )
     jitter_us: TimeUs = Field(
-        default=0.0, description="How late it may be queued; it may be more than its period [us]", examples=[500]
+        default=0.0, description="How late it may be queued; may exceed the period [us]", examples=[500]
     )
     deadline_us: PeriodUs | None = Field(
         default=None,
-        description="When it must have arrived, from its start; without it its period [us]",
+        description="Time from its start to its arrival, at most; without it the period [us]",
         examples=[5000],
     )
 
     @model_validator(mode="after")
     def _is_one_frame(self) -> Self:
+        if self.per_node and self.sender is not None:
+            raise refused(Problem("has each node for its sender", key="sender", kind="inconsistent"))
         if self.payload_bytes > FRAME_BYTES and not self.fd:
             why = f"is over the {FRAME_BYTES:g} bytes of a classical frame; fd = true allows {FD_FRAME_BYTES:g}"
             raise refused(Problem(why, key="payload_bytes"))
@@ -254,7 +270,7 @@ class CanLimits(Limits):
 
     max_load: Annotated[float, Field(gt=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(MAX_LOAD),
-        description="Largest load of the bus by all messages in the worst case, 0..0.999 (Lenze: 0.8)",
+        description="Largest worst-case load of the bus, 0..0.999 (Lenze: 0.8)",
         examples=[0.6],
     )
 
@@ -278,7 +294,7 @@ class CanProfile(Profile):
         description="The communication cycle; a network of messages alone has none",
     )
     payload: CanPayload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
-    node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
+    node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
     group: Annotated[tuple[CanGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )

@@ -21,7 +21,7 @@ from busplan.buses.can.frames import (
     repeated_by_place,
     streams,
 )
-from busplan.elementwise import choose, is_off, plain, smaller, total
+from busplan.elementwise import choose, is_everywhere, is_off, plain, smaller, total
 from busplan.english import first_of
 
 if TYPE_CHECKING:
@@ -80,13 +80,19 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     Nothing of that is still pending from the cycle before: all that was queued by w behind its start has been sent by
     then, and w is within the period.
 
+    In a queue that is not by priority SYNC or a PDO may be behind each message of its sender. So frames go before it
+    up to the last identifier of the queue.
+
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
-    sent = streams(traffic)
+    return _waits(_offered(traffic), traffic, others_us, due)
+
+
+def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> Waits:
     cyclic = [stream for stream in sent if not stream.is_message]
-    messages = [stream for stream in sent if stream.is_message]
     bit, fullest = bit_us(traffic.bit_rate_kbit_s), last_place(cyclic)
+    messages = [stream for stream in arriving(sent, fullest) if stream.is_message]
     last, most = fullest, int(MOST_BLOCKS)
     if due is not None:
         last = last_place(sent_in(cyclic, due))
@@ -123,6 +129,22 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     return Waits(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
 
 
+def before_the_last(traffic: Traffic, due: frozenset[str] | None, name: str) -> tuple[Points, Points]:
+    """Whether a message goes before the last frame of a cycle, and how late it comes to that [us].
+
+    Parameters
+    ----------
+    traffic, due
+        As `waits` takes them.
+    name
+        Name of the message.
+    """
+    sent = _offered(traffic)
+    cyclic = [stream for stream in sent if not stream.is_message]
+    (message,) = (stream for stream in arriving(sent, last_place(cyclic)) if stream.is_message and stream.name == name)
+    return message.first_place <= last_place(cyclic if due is None else sent_in(cyclic, due)), message.jitter_us
+
+
 _OF_MESSAGES: Final = ("identifiers", "burst", "period_us", "jitter_us", "deadline_us")
 """What `response.cycle_waits` takes of each message beside its frames."""
 
@@ -151,11 +173,62 @@ def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tu
     is_verdict
         Whether a bound, without parts, is enough where it shows that a deadline is kept.
     """
-    sent = streams(traffic)
+    sent = _offered(traffic)
     messages = [number for number, stream in enumerate(sent) if stream.is_message]
     enough_us = [stream.deadline_us for stream in sent] if is_verdict else None
-    worst = _worst(sent, messages, _starts(traffic), traffic, enough_us=enough_us)
-    return tuple((sent[number], response) for number, response in worst)
+    worst = _worst(sent, messages, _starts(sent, traffic), traffic, enough_us=enough_us)
+    return tuple((sent[number], response) for number, response in worst.items())
+
+
+@lru_cache(maxsize=4)
+def _offered(traffic: Traffic) -> tuple[Stream, ...]:
+    """Every stream, with the instant from which on its queue offers it: R - C, the smallest that agrees with itself.
+
+    References
+    ----------
+    R. I. Davis, S. Kollmann, V. Pollex, F. Slomka, Controller Area Network (CAN) schedulability analysis with FIFO
+    queues, ECRTS 2011: what waits in such a queue comes to others with the buffering delay as jitter. R. I. Davis,
+    N. Navet, Controller Area Network (CAN) schedulability analysis for messages with arbitrary deadlines in FIFO and
+    work-conserving queues, WFCS 2012: in a queue of any order a message may wait for each other one of it.
+    """
+    sent = streams(traffic)
+    queued = [number for number, stream in enumerate(sent) if stream.is_message and stream.queue_place is not None]
+    for _ in range(_ROUNDS if queued else 0):
+        before, worst = sent, _worst(sent, queued, _starts(sent, traffic), traffic)
+        sent = tuple(
+            stream._replace(offered_us=smaller(worst[number].us - stream.frame_us, _NEVER_US))
+            if number in worst
+            else stream
+            for number, stream in enumerate(sent)
+        )
+        if all(is_everywhere(sent[number].offered_us <= before[number].offered_us) for number in queued):
+            return sent
+    if not queued:
+        return sent
+    # Where they agree at some points only.
+    return tuple(
+        stream._replace(offered_us=choose(stream.offered_us <= earlier.offered_us, stream.offered_us, _NEVER_US))
+        for stream, earlier in zip(sent, before, strict=True)
+    )
+
+
+_ROUNDS: Final = 100
+"""Rounds in which the delays in queues must agree."""
+_NEVER_US: Final = 1e12
+"""A delay that ends no more [us]: more than a period may be, and finite, for it is divided by periods."""
+
+
+def arriving(sent: Sequence[Stream], end: Points) -> list[Stream]:
+    """Streams as they come to those that go before a place: a message of a queue that reaches behind it comes late.
+
+    Where its queue does not reach so far, all that it waits for goes before the place, too.
+    """
+    return [
+        stream
+        if stream.queue_place is None or not stream.is_message
+        else stream._replace(jitter_us=choose(stream.queue_place > end, stream.offered_us, stream.jitter_us))
+        for stream in sent
+    ]
 
 
 def sync_response(traffic: Traffic) -> Response:
@@ -163,9 +236,10 @@ def sync_response(traffic: Traffic) -> Response:
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    sent = streams(traffic)
-    ((_, worst),) = _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])
-    return worst
+    sent = _offered(traffic)
+    if sent[0].queue_place is not None:
+        sent = (sent[0], *(stream for stream in sent if stream.is_message))
+    return _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
 
 
 @lru_cache(maxsize=4)
@@ -174,7 +248,7 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
 
     Arguments are as `message_responses` has them, in plain numbers.
     """
-    sent = streams(traffic)
+    sent = _offered(traffic)
     sync = [(sent[0], sync_response(traffic))] if traffic.has_cycle else []
     # The last frame of each PDO.
     ends = {
@@ -182,7 +256,7 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     }
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
-    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], traffic)]
+    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], traffic).items()]
     return (*sync, *pdos, *message_responses(traffic))
 
 
@@ -197,9 +271,9 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
         Place of the response.
     """
     answered, worst = responses(traffic)[place]
-    higher, blocking = [], ""
-    for stream in streams(traffic):
-        if (stream.block if answered.is_message else stream.first_place) <= answered.last_place:
+    higher, blocking, sent = [], "", _offered(traffic)
+    for stream in arriving(sent, answered.end_place):
+        if (stream.block if answered.is_message else stream.first_place) <= answered.end_place:
             higher.append(stream)
         elif not blocking and stream.frame_us == worst.blocking_us and (stream.is_message or answered.name != SYNC):
             blocking = stream.label
@@ -209,7 +283,7 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
         higher.append(repeated(higher, traffic)._replace(jitter_us=errors[0].jitter_us))
     waited_us = worst.blocking_us + worst.interference_us + worst.instance * answered.frame_us
     window_us = waited_us + bit_us(traffic.bit_rate_kbit_s)
-    for start in _starts(traffic) if answered.is_message else [_Start()]:
+    for start in _starts(sent, traffic) if answered.is_message else [_Start()]:
         numbers = [
             (stream.identifiers - (stream == answered))
             * (
@@ -251,21 +325,25 @@ class _Start(NamedTuple):
         return smaller(self.late_us - again_us, 0.0)
 
 
-def _starts(traffic: Traffic) -> list[_Start]:
+def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
     """Where a busy period of a message may begin: it has the worst of these.
 
     SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
     once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
-    that follows it sooner than a period later.
+    that follows it sooner than a period later. Behind messages of their queue these may be as late as the end of the
+    cycle; SYNC behind such messages begins no other busy period, for all that is before it then is sent in this cycle.
     """
     if not traffic.has_cycle:
         return [_Start()]
     us = dict.fromkeys((SYNC, _FEEDBACK, _COMMAND), 0.0)
-    for stream in streams(traffic):
+    for stream in sent:
         if not stream.is_message:
             us[stream.name] = us[stream.name] + stream.frames_us
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
-    commands_us = waits(traffic, others_us).lasts_us - us[_COMMAND]
+    lasts_us = _waits(sent, traffic, others_us).lasts_us
+    if any(stream.queue_place is not None and not stream.is_message for stream in sent):
+        return [_Start(), _Start((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
+    commands_us = lasts_us - us[_COMMAND]
     feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
     return [
         _Start(),
@@ -282,8 +360,8 @@ def _worst(
     *,
     blocks: Sequence[bool] | None = None,
     enough_us: Sequence[Points] | None = None,
-) -> Iterator[tuple[int, Response]]:
-    """Worst-case response of the last frame of some streams, which is the longest of the stream's, with their numbers.
+) -> dict[int, Response]:
+    """Worst-case response of the last frame of some streams, which is the longest of the stream's, by their numbers.
 
     Parameters
     ----------
@@ -300,8 +378,29 @@ def _worst(
     enough_us
         Of each stream, a response that a bound may show it to have [us].
     """
-    if not answered:
-        return
+    levels: dict[object, list[int]] = {}
+    for number in answered:
+        later = [stream.queue_place > sent[number].end_place for stream in sent if stream.queue_place is not None]
+        # Those before the same ends of queues meet all others alike.
+        is_plain = all(isinstance(is_it, bool) for is_it in later)
+        levels.setdefault(sum(later) if is_plain else f"message {number}", []).append(number)
+    worst: dict[int, Response] = {}
+    for numbers in levels.values():
+        seen = arriving(sent, sent[numbers[0]].end_place)
+        worst |= _searched(seen, numbers, starts, traffic, blocks=blocks, enough_us=enough_us)
+    return {number: worst[number] for number in answered}
+
+
+def _searched(
+    sent: Sequence[Stream],
+    answered: Sequence[int],
+    starts: Sequence[_Start],
+    traffic: Traffic,
+    *,
+    blocks: Sequence[bool] | None,
+    enough_us: Sequence[Points] | None,
+) -> Iterator[tuple[int, Response]]:
+    """Responses of streams that meet the others alike, with arguments as `_worst` has them."""
     both = [*sent, *repeated_by_place(sent, traffic)]
     order = sorted(range(len(both)), key=lambda number: both[number].block)
     ranked, rank_of = [both[number] for number in order], {number: rank for rank, number in enumerate(order)}
@@ -311,7 +410,7 @@ def _worst(
     group = [groups.setdefault(tuple(map(_token, us)), len(groups)) for us in times_us]
     period_us, *jitters_us = zip(*dict(zip(group, times_us, strict=True)).values(), strict=True)
     columns = (
-        [stream.last_place for stream in ranked],
+        [stream.end_place for stream in ranked],
         [stream.frame_us for stream in ranked],
         [
             both[number].frame_us if number < len(sent) and (blocks is None or blocks[number]) else 0.0

@@ -1,5 +1,6 @@
 """The frames of an EtherCAT cycle: devices packed into datagrams, groups at their rates, and delays on the way."""
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import chain
@@ -20,6 +21,7 @@ from busplan.buses.ethercat.equations import (
     STATE_CHECK_BYTES,
     UNNAMED,
     ProcessData,
+    Starts,
     cable_us,
     datagram_bytes,
     device_us,
@@ -56,6 +58,8 @@ class Devices(NamedTuple):
     """Number of devices [1]."""
     data_bytes: Number
     """Process data of each device [bytes]."""
+    starts: Starts | None = None
+    """What begins with them, not to hold data of devices before them."""
 
 
 class Packing(NamedTuple):
@@ -109,6 +113,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     datagrams_bytes: Number = first_bytes
     padding: Number = 0.0
     before: Number = 0.0
+    behind: Number = 0  # devices so far
     if not is_off(first_bytes):
         # The master's datagrams go alone where the first device has no room after them.
         has_room = room - first_bytes - _first_device_bytes(devices) >= 0
@@ -117,7 +122,14 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         datagrams_bytes = last
         frames = 1
     for group in devices:
+        if group.starts:
+            left = larger(free - headers, 0.0) if group.starts == "datagram" else 0.0
+            free = choose(behind > 0, left, free)
         fitting = smaller(group.number, rounded_down(free / group.data_bytes))
+        if group.starts:
+            joining = choose(behind > 0, choose(fitting > 0, headers, 0.0), 0.0)
+            last, datagrams_bytes = last + joining, datagrams_bytes + joining
+        behind = behind + group.number
         rest = group.number - fitting
         last, free = last + fitting * group.data_bytes, free - fitting * group.data_bytes
         per_frame = larger(rounded_down(room / group.data_bytes), 1)
@@ -136,7 +148,7 @@ def _with_data(devices: Devices) -> Devices:
     if is_everywhere(devices.data_bytes > 0):
         return devices
     number = choose(devices.data_bytes > 0, devices.number, 0)
-    return Devices(number, larger(devices.data_bytes, 1))
+    return Devices(number, larger(devices.data_bytes, 1), devices.starts)
 
 
 def _first_device_bytes(devices: Sequence[Devices]) -> Number:
@@ -179,6 +191,12 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
         size, left = plain(group.data_bytes), int(plain(group.number))
+        if group.starts and filled and size and left:
+            if group.starts == "datagram" and opened + filled + headers + size <= room:
+                filled += headers
+            else:
+                yield FrameRun(first, held, opened + headers + filled)
+                first, held, opened, filled = first + held, 0, 0.0, 0.0
         # Couplers have no data and fit into any frame.
         fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1) if size else left
         added = min(left, fitting)
@@ -207,6 +225,11 @@ class Unit(NamedTuple):
     devices: int
     data_bytes: float
     """Process data of each device [bytes]."""
+    starts: Starts | None = None
+
+    def present(self, *, is_due: bool) -> Devices:
+        """Its devices in a cycle, without data where it is not due."""
+        return Devices(self.devices, self.data_bytes * is_due, self.starts)
 
 
 class UnitCycle(NamedTuple):
@@ -285,7 +308,7 @@ def unit_cycles(
     """
     cycles = []
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
-        present = [Devices(unit.devices, unit.data_bytes * is_due) for unit, is_due in zip(units, due, strict=True)]
+        present = [unit.present(is_due=is_due) for unit, is_due in zip(units, due, strict=True)]
         packed = pack(present, datagrams=datagrams, first_bytes=first_bytes)
         data_bytes = plain(sum(group.number * group.data_bytes for group in present))
         cycles.append(UnitCycle(due, numbers, plain(packed.wire_bytes), plain(packed.last_bytes), data_bytes))
@@ -317,7 +340,7 @@ def has_rates(network: Network) -> bool:
 
 def rates(network: Network) -> tuple[Rate, ...]:
     """The rate of each group with its first cycle; of plain numbers."""
-    units, _ = _units(map(plain, _cycle_inputs(network, _all_devices(network))))
+    units, _ = _units(network, map(plain, _cycle_inputs(network, _all_devices(network))))
     return unit_rates(units, is_spread=network.profile.bus.units == "spread")
 
 
@@ -367,27 +390,83 @@ def mean_wire_bytes(network: Network, *, with_reception: Number) -> Number:
     return pointwise(at_point, with_reception, *_cycle_inputs(network, _all_devices(network)), words=words)
 
 
+def moves_us(network: Network, group: int) -> Number:
+    """How far the ends of a device's frame lie apart over the cycles with its data, the most of any of a group [us].
+
+    Frames start at the same time in each cycle; units that are not in every cycle make them longer.
+
+    Parameters
+    ----------
+    network
+        The network.
+    group
+        Index of the group.
+    """
+    if not has_rates(network):
+        return 0.0
+
+    def at_point(*numbers: float) -> float:
+        units, first_bytes = _units(network, numbers)
+        cycles = [
+            _frame_ends(network, units, cycle.due, first_bytes)
+            for cycle in _cycles(network, numbers)
+            if cycle.due[group]
+        ]
+        first = sum(unit.devices for unit in units[:group]) + 1
+        devices = range(first, first + units[group].devices)
+        # Only at the first device of a frame another end begins.
+        starts = {device + 1 for ends in cycles for device, _ in ends if device + 1 in devices}
+        moved_bytes = 0.0
+        for device in starts.union(devices[:1]):
+            sent = [ends[min(bisect_left(ends, (device,)), len(ends) - 1)][1] for ends in cycles]
+            moved_bytes = max(moved_bytes, max(sent) - min(sent))
+        return plain(sending_us(moved_bytes))
+
+    words = "the latest end of the device's frame less the earliest, over the cycles with its data"
+    return pointwise(at_point, *_cycle_inputs(network, _all_devices(network)), words=words)
+
+
+def _frame_ends(
+    network: Network, units: Sequence[Unit], due: Sequence[bool], first_bytes: float
+) -> list[tuple[int, float]]:
+    """The last device of each frame of a cycle, and what is on the wire by its end [bytes]; of plain numbers."""
+    present = [unit.present(is_due=is_due) for unit, is_due in zip(units, due, strict=True)]
+    ends, sent_bytes = [], 0.0
+    for run in frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes):
+        for carried in run.by_frame():
+            sent_bytes += plain(frame_bytes(run.datagrams_bytes))
+            ends.append((carried.stop - 1, sent_bytes))
+    return ends
+
+
 def _all_devices(network: Network) -> tuple[Devices, ...]:
     """All devices in their order, whatever their rate."""
-    return tuple(Devices(group.nodes, data_bytes(group, network)) for group in network.groups)
+    return tuple(Devices(group.nodes, data_bytes(group, network), _starts(group)) for group in network.groups)
+
+
+def _starts(group: Group) -> Starts | None:
+    """What begins with a group; the devices of [node] are alone."""
+    starts: Starts | None = getattr(group.node, "starts", None)
+    return starts
 
 
 def _cycle_inputs(network: Network, whole: Sequence[Devices]) -> tuple[Number, ...]:
     """Inputs of the cycles, flat for `pointwise`: the master's datagrams; rate, devices and bytes of each group."""
-    units = ((group.every, *devices) for group, devices in zip(network.groups, whole, strict=True))
+    units = ((group.every, *devices[:2]) for group, devices in zip(network.groups, whole, strict=True))
     return (housekeeping_bytes(network), *chain.from_iterable(units))
 
 
-def _units(numbers: Iterable[float]) -> tuple[tuple[Unit, ...], float]:
+def _units(network: Network, numbers: Iterable[float]) -> tuple[tuple[Unit, ...], float]:
     """The units, and the master's own datagrams [bytes], from the flat inputs of `_cycle_inputs`."""
     first_bytes, *of_units = numbers
-    columns = zip(of_units[::3], of_units[1::3], of_units[2::3], strict=True)
-    return tuple(Unit(int(every), int(nodes), data_bytes) for every, nodes, data_bytes in columns), first_bytes
+    columns = zip(of_units[::3], of_units[1::3], of_units[2::3], map(_starts, network.groups), strict=True)
+    units = (Unit(int(every), int(nodes), data_bytes, starts) for every, nodes, data_bytes, starts in columns)
+    return tuple(units), first_bytes
 
 
 def _cycles(network: Network, numbers: Iterable[float]) -> tuple[UnitCycle, ...]:
     """The distinct cycles, from the inputs of `_cycle_inputs`."""
-    units, first_bytes = _units(numbers)
+    units, first_bytes = _units(network, numbers)
     is_spread = network.profile.bus.units == "spread"
     return unit_cycles(units, is_spread=is_spread, datagrams=datagrams(network), first_bytes=first_bytes)
 

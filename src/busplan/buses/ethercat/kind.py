@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
-from math import ceil
+from math import ceil, inf
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
+from busplan.buses.emulation import Emulator
 from busplan.buses.ethercat.cycle import (
     EVENTS,
     LAST_BYTE,
@@ -26,7 +27,7 @@ from busplan.buses.ethercat.equations import (
     SYNC_SHIFT,
     room_bytes,
 )
-from busplan.buses.ethercat.frames import data_bytes, datagrams, layout
+from busplan.buses.ethercat.frames import data_bytes, datagrams, layout, moves_us
 from busplan.buses.limits import (
     NODE_LIMIT,
     NOT_SHOWN_KEPT,
@@ -40,12 +41,13 @@ from busplan.buses.limits import (
     TimingModel,
     share_of_period,
 )
-from busplan.buses.network import Network
+from busplan.buses.network import Group, Network
 from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, larger, plain
+from busplan.elementwise import Number, choose, larger, plain
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
+from busplan.sections.base import MAX_TIME_US
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,6 +86,51 @@ SYNC0: Final = share_of_period(
     way_out="a larger bus.sync_shift moves SYNC0 later",
 )
 """A command must be in every device before SYNC0."""
+
+
+def _moves_us(network: Network) -> Iterator[tuple[Group, Number]]:
+    """Groups whose drives have a window about SYNC0, and how far their frames move against it [us]."""
+    for index, group in enumerate(network.groups):
+        if network.profile.bus.distributed_clocks and group.node.sync_window_us is not None:
+            yield group, network.profile.bus.master_jitter_us + moves_us(network, index)
+
+
+def _beyond_window_us(network: Network) -> Number:
+    """How far frames may move beyond a drive's window, the most of any group; below 0 inside of it [us]."""
+    beyond_us: Number = -inf
+    for group, us in _moves_us(network):
+        beyond_us = larger(beyond_us, us - group.node.sync_window_us)
+    return beyond_us + _unknown_jitter_us(network)
+
+
+def _unknown_jitter_us(network: Network) -> Number:
+    """The jitter that a master may have whose jitter is not given: any [us]."""
+    return choose(network.profile.bus.master_jitter_us > 0, 0.0, MAX_TIME_US)
+
+
+def _window_words(network: Network) -> str:
+    """Say how far frames move at the group that is farthest beyond its window, and the jitter that it allows."""
+    jitter_us = plain(network.profile.bus.master_jitter_us)
+    moves = ((group, plain(us), plain(group.node.sync_window_us)) for group, us in _moves_us(network))
+    group, us, most_us = max(moves, key=lambda move: move[1] - move[2])
+    of_group = f"{group.name}: " if group.name else ""
+    without = "" if jitter_us else " without the jitter, which is not given"
+    left_us = most_us - us + jitter_us
+    allowed = f"a jitter of {left_us:.1f} us is allowed" if left_us > 0 else "no jitter is small enough"
+    return f"{of_group}frames move {us:.1f} us against SYNC0{without}, and a drive allows {most_us:g} us: {allowed}"
+
+
+SYNC_WINDOW: Final = Limit(
+    "sync_window",
+    _window_words,
+    _beyond_window_us,
+    lambda _network: 0,
+    doubt=lambda _network: 0.0,
+    perhaps=_unknown_jitter_us,
+    way_out="measure bus.master_jitter_us, or make it smaller",
+    place="bus.master_jitter_us",
+)
+"""A frame must not move farther against SYNC0 than each drive allows."""
 LIMITS: Final = (
     NODE_LIMIT,
     Limit(
@@ -106,8 +153,10 @@ LIMITS: Final = (
         lambda network: reduce(larger, (group.node.cable_m for group in network.groups)),
         lambda _network: MOST_CABLE_M,
         way_out="a device in between would do",
+        place="node.cable_m",
     ),
     SYNC0,
+    SYNC_WINDOW,
 )
 
 
@@ -289,6 +338,12 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         from busplan.buses.ethercat.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, progress=progress)
+
+    def emulator(self) -> Emulator:
+        """Captures of the master's port."""
+        from busplan.buses.ethercat.emulated import EMULATOR  # as above
+
+        return EMULATOR
 
 
 BUS = Ethercat()

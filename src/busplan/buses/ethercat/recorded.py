@@ -93,7 +93,7 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     share
         Quantile of the cycles for jitter and the master's time, 0.5..1.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -108,7 +108,8 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     seen = _Seen(network, frames, share)
     figures = tuple(seen.figures())
     day = day_of(int(frames.times_ns[0]))
-    return Recorded(figures, tuple(seen.remarks()), seen.edits(), day, seen.shows_nothing())
+    compared = Recorded(figures, tuple(seen.remarks()), seen.edits(), day, seen.shows_nothing())
+    return compared.unless_synthetic(frames.notes.synthetic)
 
 
 class _Seen:

@@ -14,12 +14,13 @@ from busplan.buses.ethercat.equations import (
     Master,
     Port,
     ProcessData,
+    Starts,
     room_bytes,
 )
 from busplan.buses.ethercat.frames import MOST_CYCLES, checked_hyperperiod
 from busplan.elementwise import Number
 from busplan.errors import BusplanError
-from busplan.sections.base import MAX_COUNT, MISSING, Bytes, Count, Problem, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, refused
 from busplan.sections.cycle import (
     UNKNOWN_SHARE,
     BusSection,
@@ -43,36 +44,35 @@ class EthercatBus(BusSection):
     nodes: Count | None = Field(default=None, description="Devices N, the master not counted", examples=[8])
     master: Master | None = Field(
         default=None,
-        description="Name of the master, which says how process data travel and what datagrams it adds; without it "
-        "the most bytes of those known but ethercrab",
+        description="Master, which sets process_data and housekeeping_bytes; without it the most bytes of those "
+        "known but ethercrab",
         examples=["SOEM"],
     )
     process_data: ProcessData | None = Field(
         default=None,
-        description="How process data travel: LRW-separate, one datagram, outputs and inputs in bytes of their own; "
-        "LRW-shared, in the same bytes; LRD-LWR, two datagrams; without it as the master has it",
+        description="How process data travel: LRW-separate, in bytes of their own; LRW-shared, in the same bytes; "
+        "LRD-LWR, in two datagrams; without it by the master",
         examples=[SEPARATE],
     )
     housekeeping_bytes: Annotated[tuple[HousekeepingBytes, ...], Field(strict=False)] | None = Field(
         default=None,
-        description="Data of each datagram that the master adds to the first frame of every cycle, those of "
-        "distributed clocks among them; without it as the master has it [bytes]",
+        description="Data of each datagram that the master adds to a cycle, distributed clocks included; without it "
+        "by the master [bytes]",
         examples=[[2, 8]],
     )
     distributed_clocks: bool = Field(
         default=False,
-        description="Whether devices have distributed clocks: the master adds a datagram for them, and drives act at "
-        "SYNC0",
+        description="Whether devices have distributed clocks: one more datagram, and drives act at SYNC0",
         examples=[True],
     )
     sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(SYNC_SHIFT),
-        description="Where SYNC0 lies after the master's task, a share of the period, 0..0.999; 0 is the SYNC0 at the "
-        "next task; used only with distributed clocks",
+        description="SYNC0 after the master's task, a share of the period, 0..0.999; 0 is the next task; with "
+        "distributed clocks only",
         examples=[0.5],
     )
     mailbox_polls: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
-        default=0, description="Mailbox polls in each cycle, each a frame of its own", examples=[1]
+        default=0, description="Mailbox polls in each cycle, each in its own frame", examples=[1]
     )
     mailbox_bytes: Annotated[int, Field(ge=1, le=int(room_bytes(1)))] = Field(
         default=int(MAILBOX_BYTES), description="Data of each mailbox poll [bytes]", examples=[int(MAILBOX_BYTES)]
@@ -88,27 +88,24 @@ class EthercatBus(BusSection):
     )
     master_uncertainty_us: TimeUs | None = Field(
         default=None,
-        description="Standard uncertainty of master_us; without it 10 % of it where it is measured, derived or "
-        "calibrated, else half of it [us]",
+        description="Standard uncertainty of master_us; without it 10 % where that is measured, derived or "
+        "calibrated, else 50 % [us]",
         examples=[5],
     )
     master_jitter_us: TimeUs = Field(default=0.0, description="How late the frames may start [us]", examples=[20])
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
-        description="Cycles from the frame that brings feedback to the one that takes the command computed from it; "
-        "used in latencies and in a loop on the host",
+        description="Cycles from feedback to the command computed from it; for latency, and a loop on the host",
         examples=[1],
     )
     units: Literal["spread", "together"] = Field(
         default="spread",
-        description="Where groups with every > 1 go: spread over different cycles as evenly as possible, or all of "
-        "them together in one",
+        description="Groups with every > 1: spread evenly over cycles, or together in one",
         examples=["together"],
     )
     timing_model: TimingModelName = Field(
         default=LAST_BYTE,
-        description="Timing model whose figures lead the tables, last-byte or vendors; the verdict is always by "
-        "last-byte",
+        description="Timing model whose figures lead the tables; the verdict is always by last-byte",
         examples=[LAST_BYTE],
     )
 
@@ -126,17 +123,22 @@ class EthercatNode(NodeSection):
 
     port: Port = Field(
         default="100BASE-TX",
-        description="Ports of the device, which say its delay: 100BASE-TX, or E-bus between the terminals of a block",
+        description="Ports, which set the delay: 100BASE-TX, or E-bus between the terminals of a block",
         examples=["E-bus"],
     )
     delay_us: TimeUs | None = Field(
         default=None,
-        description="Delay of the device one way, measured, as the time stamps of distributed clocks tell it less the "
-        "cable; without it by its port [us]",
+        description="Measured delay of the device one way, without cable; without it by the port [us]",
         examples=[0.7],
     )
     cable_m: Annotated[float, Field(ge=0, le=_LONGEST_CABLE_M, allow_inf_nan=False)] = Field(
         default=0.0, description="Cable from the device before it, or from the master [m]", examples=[2]
+    )
+    sync_window_us: Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="How far a frame may move against SYNC0 from cycle to cycle before the device reports an error; "
+        "used only with distributed clocks [us]",
+        examples=[50],
     )
 
 
@@ -153,6 +155,12 @@ class EthercatGroup(EthercatNode, GroupSection):
     axes: GroupAxes = Field(examples=[4])
     every: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
         default=1, description="The group's process data go in every n-th cycle [1]", examples=[4]
+    )
+    starts: Starts | None = Field(
+        default=None,
+        description="What begins with the group: a datagram of its own, as of a domain of IgH, or a frame of its own, "
+        "as of a task of TwinCAT; without it its data follow in the datagram of the group before",
+        examples=["datagram"],
     )
     execution: Execution = Field(
         default_factory=_no_time_without_axes,

@@ -216,7 +216,7 @@ class CycleWithStarts(BusCycle):
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
     def premises(self) -> tuple[str, ...]:
-        """Of a lower bound, that no bus of its speed was measured."""
+        """Note of a lower bound: no bus of this speed was measured."""
         if self.link.has_gaps:
             return ()
         return (f"packets and cables alone: no bus at {self.network.profile.bus.speed} was measured",)

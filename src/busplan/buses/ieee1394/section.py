@@ -55,15 +55,14 @@ class Ieee1394Bus(BusSection):
     )
     gap_count: GapCount = Field(
         default=MAX_GAP_COUNT,
-        description='Gap count of all nodes, 0..63, or "optimal": the smallest safe one for the hops. Not used from '
-        "S800 on",
+        description='Gap count of all nodes; "optimal": the smallest safe one for the hops. Not used from S800 on',
         examples=[MAX_GAP_COUNT],
     )
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[2])
     max_hops: Count | None = Field(
         default=None,
-        description="Most cable hops between any two nodes of a tree, the host counted among them; "
-        "without it the bus is a chain with the host at its end",
+        description="Most cable hops between any two nodes of a tree, host included; without it the bus is a chain "
+        "with the host at its end",
         examples=[3],
     )
     cable_length_m: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = Field(
@@ -71,19 +70,19 @@ class Ieee1394Bus(BusSection):
     )
     charge_hops: Literal["farthest", "own"] = Field(
         default="farthest",
-        description="Cable hops in the times of each node: those to the farthest node, or its own (in a tree, the "
-        "hops of its group). A broadcast always goes to the farthest",
+        description="Hops in the times of each node: those of the farthest, or its own. A broadcast always goes to the "
+        "farthest",
         examples=["own"],
     )
     root: Literal["host"] | None = Field(
         default=None,
-        description='Root, which grants arbitration: "host"; without it any node may be the root, so with '
-        'charge_hops = "own" arbitration still counts the hops of the whole chain',
+        description="Root, which grants arbitration; without it any node may be the root, so that arbitration always "
+        "counts the hops of the whole chain",
         examples=["host"],
     )
     timing_model: TimingModelName = Field(
         default="standard",
-        description="Timing model whose figures lead the tables, paper or standard; the verdict is always by standard",
+        description="Timing model whose figures lead the tables; the verdict is always by standard",
         examples=["standard"],
     )
     cycle_master: bool = Field(
@@ -148,15 +147,14 @@ class Ieee1394CycleSection(CycleSection):
     slice_ratio: SliceRatio = float(SLICE_RATIO)
     schedule: Literal["individual", "broadcast"] = Field(
         default="individual",
-        description="How the host reads and writes: individual, a read and a write of each node; broadcast, one query, "
-        "after which each node broadcasts its data, one read of the hub that collected them, and one write",
+        description="individual: a read and a write of each node; broadcast: one query, after which each node "
+        "broadcasts its data, one read of the hub that collected them, and one write",
         examples=["broadcast"],
     )
     broadcast_request: Literal["isochronous", "priority", "timed"] = Field(
         default="priority",
-        description="How the nodes ask for the bus to broadcast: priority, each after a subaction gap (JHU firmware "
-        "Rev 9); isochronous, without one (Rev 8); timed, each at a time of its own (up to Rev 7). Used only "
-        "by the broadcast schedule",
+        description="priority: each node broadcasts after a subaction gap (JHU firmware Rev 9); isochronous: without "
+        "one (Rev 8); timed: at a time of its own (up to Rev 7)",
         examples=["isochronous"],
     )
     retries: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(

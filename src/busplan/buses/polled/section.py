@@ -29,21 +29,20 @@ class PolledBus(BusSection):
     nodes: Count | None = Field(default=None, description="Nodes N, master not counted", examples=[14])
     requests: Requests | None = Field(
         default=None,
-        description="How nodes are asked: exchange (one request writes and reads a node), sync (one request for all "
-        "nodes of a group) or single (a request for each node and direction). Without it the first of these that the "
-        "protocol has",
+        description="How nodes are asked: exchange, both ways in one request; sync, all nodes of a group in one; "
+        "single, one node one way; without it the first of these that the protocol has",
         examples=["sync"],
     )
     reads: Annotated[int, Field(ge=1, le=1000)] = Field(
-        default=1, description="Requests that the data read from a node are split over", examples=[3]
+        default=1, description="Requests that share the data read from a node", examples=[3]
     )
     writes: Annotated[int, Field(ge=1, le=1000)] = Field(
-        default=1, description="Requests that the data written to a node are split over", examples=[1]
+        default=1, description="Requests that share the data written to a node", examples=[1]
     )
     return_delay_us: TimeUs | None = Field(
         default=None,
-        description="Delay of an answer that is set in the nodes, not a part of node.execution. Without it that of a "
-        "new node [us]",
+        description="Delay of an answer that is set in the nodes, beside node.execution; without it that of a new "
+        "node [us]",
         examples=[0],
     )
     max_turn_bits: BitTimes | None = Field(
@@ -54,8 +53,7 @@ class PolledBus(BusSection):
     )
     adapter_us: TimeUs = Field(
         default=0.0,
-        description="Time that the host's adapter adds to each request with answers, as the latency timer of a USB "
-        "adapter [us]",
+        description="Time that the host's adapter adds to each request with answers, as a USB latency timer [us]",
         examples=[1000],
     )
     host_us: TimeUs = Field(
@@ -76,8 +74,7 @@ class PolledBus(BusSection):
     )
     timing_model: TimingModelName = Field(
         default=STANDARD,
-        description="Timing model whose figures lead the tables, standard or typical; the verdict is always by "
-        "standard",
+        description="Timing model whose figures lead the tables; the verdict is always by standard",
         examples=[STANDARD],
     )
 

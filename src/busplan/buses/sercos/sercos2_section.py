@@ -16,18 +16,18 @@ class Sercos2Bus(BusSection):
 
     kind: Literal["sercos2"] = Field(description="Kind of bus", examples=["sercos2"])
     data_rate_mbit_s: DataRate = Field(
-        description="Data rate of the ring: 2 or 4, and with SERCOS II 8 or 16 [Mbit/s]", examples=[16]
+        description="Data rate of the ring; 8 and 16 with SERCOS II [Mbit/s]", examples=[16]
     )
     at_gap_us: TimeUs = Field(
-        description="Gap between the telegrams of two drives. No public figure says how long it is: take it from the "
-        "master's time slots, or assume one [us]",
+        description="Gap between the telegrams of two drives; not published: take it from the master's time slots, "
+        "or assume it [us]",
         examples=[5],
     )
     nodes: Count | None = Field(default=None, description="Drives N, master not counted", examples=[8])
     at_start_us: TimeUs | None = Field(
         default=None,
-        description="From MST to the first AT, t1min of the slowest drive (S-0-0003). Without it 12 at 2 and 4 Mbit/s, "
-        "4 at 8 and 16 [us]",
+        description="From MST to the first AT, t1min of the slowest drive (S-0-0003); without it 12 at 2 and 4 "
+        "Mbit/s, 4 at 8 and 16 [us]",
         examples=[12],
     )
     turnaround_us: TimeUs = Field(
@@ -42,14 +42,13 @@ class Sercos2Bus(BusSection):
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=MOST_PIPELINE)] = Field(
         default=int(PIPELINE_CYCLES),
-        description="Cycles from the AT that bring feedback to the MDT with the command computed from it; 0 where the "
-        "master computes between them, within turnaround_us. Of a loop on the host",
+        description="Cycles from feedback to the command computed from it, for a loop on the host; 0: the master "
+        "computes within turnaround_us",
         examples=[2],
     )
     timing_model: TimingModelName = Field(
         default=WORST,
-        description="Timing model whose figures lead the tables, worst-stuffing or no-stuffing; the verdict is always "
-        "by worst-stuffing",
+        description="Timing model whose figures lead the tables; the verdict is always by worst-stuffing",
         examples=[WORST],
     )
 

@@ -29,18 +29,17 @@ class Sercos3Bus(BusSection):
     nodes: Count | None = Field(default=None, description="Devices N, master not counted", examples=[8])
     version: Version = Field(
         default="V1.1",
-        description="Protocol version: from V1.1 on each device's data carry 2 bytes of connection control",
+        description="Protocol version; V1.1 has 2 bytes of connection control for each device",
         examples=["V1.0"],
     )
     hot_plug_field: HotPlug = Field(
         default="all",
-        description="Which telegrams have a hot-plug field: all (specification before V1.3), or the first (from V1.3)",
+        description="Telegrams with a hot-plug field: all (before V1.3), or the first (from V1.3)",
         examples=["first"],
     )
     timing_method: TimingMethod = Field(
         default="mdt-at-ucc",
-        description="Order of MDT, AT and the channel for other frames (UCC): mdt-at-ucc, mdt-ucc-at, or at-last, with "
-        "the AT at the end of the cycle; methods 1, 2 and 3 of CoSeMa",
+        description="Order of MDT, AT and the channel for other frames (UCC); methods 1, 2 and 3 of CoSeMa",
         examples=["mdt-ucc-at"],
     )
     gap_bytes: Annotated[int, Field(ge=int(LEAST_GAP_BYTES), le=1000)] = Field(
@@ -63,30 +62,29 @@ class Sercos3Bus(BusSection):
     )
     component_delay_us: TimeUs = Field(
         default=float(COMPONENT_DELAY_US),
-        description="Delay of all components in the ring that are no devices [us]",
+        description="Delay of all other components in the ring [us]",
         examples=[1.8],
     )
     at_start_us: TimeUs | None = Field(
         default=None,
-        description="Least time from the start of the cycle to the first AT that the devices ask for: the largest of "
-        "their minima of S-0-1006. Without it none is counted [us]",
+        description="Least time from the start of the cycle to the first AT, the largest S-0-1006 of the devices; "
+        "without it none is counted [us]",
         examples=[100],
     )
     ring_grade: Literal["measured", "published", "assumed"] | None = Field(
         default=None,
-        description='How device_delay_us, master_jitter_us and gap_bytes are known; unless "measured", read from the '
-        "network itself, they have the uncertainty of the range that is published of each",
+        description='How device_delay_us, master_jitter_us and gap_bytes are known; unless "measured", the '
+        "published ranges are their doubt",
         examples=["measured"],
     )
     pipeline_cycles: Annotated[int, Field(ge=1, le=MOST_PIPELINE)] = Field(
         default=int(PIPELINE_CYCLES),
-        description="Cycles from the AT that bring feedback to the MDT with the command computed from it; of a loop on "
-        "the host",
+        description="Cycles from feedback to the command computed from it, for a loop on the host",
         examples=[2],
     )
     timing_model: TimingModelName = Field(
         default=WINDOW,
-        description="Timing model whose figures lead the tables, window or telegrams; the verdict is always by window",
+        description="Timing model whose figures lead the tables; the verdict is always by window",
         examples=[WINDOW],
     )
 

@@ -230,8 +230,10 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
 
 
 Floats = NDArray[np.float64]
-_MAX_POINTS: Final = 2000
-"""Most points of one curve: more would not be visible."""
+_MAX_POINTS: Final = 1000
+"""Points of the whole move's curve, smallest and largest of each pixel or so: more would not be visible."""
+_LEAST_POINTS: Final = 50
+"""Points of a part of the move, however short it is."""
 
 
 class _Part(NamedTuple):
@@ -290,7 +292,8 @@ def _parts(run: CircleRun) -> tuple[_Part, ...]:
     ranges = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))
     parts = []
     for first, end, measured in ranges:
-        kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
+        most = max(_LEAST_POINTS, _MAX_POINTS * (end - first) // run.steps)
+        kept = first + extremes(error_um[first:end], most=most)
         time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
         parts.append(_Part(time_s, error_um[kept], measured))
     return tuple(parts)
@@ -315,16 +318,15 @@ def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
     --------
     >>> extremes(np.array([0.0, 1.0, 9.0, 2.0, 3.0, -7.0, 4.0, 5.0]), most=4).tolist()
     [0, 2, 5, 7]
+    >>> len(extremes(np.linspace(0.0, 1.0, 199), most=20))
+    20
     """
     if len(values) <= most:
         return np.arange(len(values))
     width = ceil(2 * len(values) / most)
-    whole = len(values) // width
-    stretches = values[: whole * width].reshape(whole, width)
-    first = np.arange(whole) * width
-    rest = whole * width + extremes(values[whole * width :], most=width)
-    ends = np.array([0, len(values) - 1])
-    return np.unique(np.concatenate((first + stretches.argmin(axis=1), first + stretches.argmax(axis=1), rest, ends)))
+    firsts = range(0, len(values), width)
+    kept = [first + pick(values[first : first + width]) for first in firsts for pick in (np.argmin, np.argmax)]
+    return np.unique([0, *kept, len(values) - 1])
 
 
 _ROOM: Final = 0.08

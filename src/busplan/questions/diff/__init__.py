@@ -281,7 +281,7 @@ def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
 
 
 def _by_key(figures: CapacityFigures) -> _Figures:
-    """Figures of one profile by key, those of its groups among them."""
+    """Figures of one profile by key, with the figures of its groups."""
     keys = (register.SAFE_NODES.key, register.MAX_NODES.key)
     groups = {f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in keys}
     return {**figures.values(), **groups}

@@ -106,7 +106,7 @@ class Row(Section):
 
 
 class _Table(Section):
-    """A table [[evidence]]; its further keys are those of its rows."""
+    """A table [[evidence]]; its further keys hold for each of its rows."""
 
     model_config = ConfigDict(extra="allow")
     title: str

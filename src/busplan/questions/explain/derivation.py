@@ -47,7 +47,7 @@ class Step(NamedTuple):
     numbers: str
     """The computation in numbers."""
     value: object
-    """The result: a number, or a truth value; None of what does not exist."""
+    """The result: a number or a truth value; None if it does not exist."""
     unit: str
     """Unit of the result; empty for counts and shares."""
 
@@ -62,9 +62,9 @@ class Derivation:
     transaction: str | None
     """Transaction of a figure of `latency`; None for others."""
     period_us: float | None
-    """None of a network without a cycle."""
+    """Communication period; None for a network without a cycle."""
     value: object
-    """Value as in the command's JSON; None of what does not exist."""
+    """Value as in the command's JSON; None if it does not exist."""
     steps: tuple[Step, ...]
     """In the order of computation; the last step is the figure, unless that is an input."""
     inputs: tuple[Input, ...]

@@ -54,6 +54,8 @@ class Certainty(NamedTuple):
     """Required time with bias, U and reserve: the shortest slice in which the cycle is shown to fit."""
     doubts: tuple[Doubt, ...]
     """Components of the uncertainty."""
+    possible_us: Number
+    """Part of the required time that is only possible: a cycle that fits without it is not shown not to fit."""
 
 
 def certainty(cycle: BusCycle) -> Certainty:
@@ -82,6 +84,7 @@ def certainty(cycle: BusCycle) -> Certainty:
         safe_required_us=(corrected_us + named(added_uncertainty_us, UNCERTAINTY.key, UNCERTAINTY.symbol))
         / (1 - network.profile.limits.reserve),
         doubts=doubts,
+        possible_us=cycle.possible_us(),
     )
 
 
@@ -94,7 +97,7 @@ def time_code(cycle: Certainty, network: Network) -> Number:
     """Verdict on the time limit, as an index of `VERDICTS`, from the certainty of a network's cycle."""
     given_us = available_us(network)
     is_shown = fits_in(cycle.safe_required_us, available_us=given_us)
-    highest_margin_us: Number = cycle.margin_corrected_us + cycle.uncertainty_us
+    highest_margin_us: Number = cycle.margin_corrected_us + cycle.uncertainty_us + cycle.possible_us
     is_broken = highest_margin_us < -FIT_ROUNDING * given_us
     return choose(is_shown, KEPT, choose(is_broken, BROKEN, NOT_SHOWN_KEPT))
 

@@ -75,9 +75,10 @@ def _runs_of_alike(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:
     """Join neighbours that differ only in name and number, so that their cycle is that of a uniform bus."""
     runs: list[list[ProfileGroup]] = []
     for group in groups:
-        # A group that sends at a slower rate has cycles of its own.
+        # A group that sends at a slower rate has cycles of its own; one that starts a frame, frames.
         is_in_every = is_everywhere(getattr(group.payload, "every", 1) <= 1)
-        if runs and is_in_every and _is_alike(runs[-1][0].node, group.node):
+        is_joined = is_in_every and getattr(group.payload, "starts", None) is None
+        if runs and is_joined and _is_alike(runs[-1][0].node, group.node):
             runs[-1].append(group)
         else:
             runs.append([group])

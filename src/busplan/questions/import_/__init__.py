@@ -84,7 +84,7 @@ class ImportAnswer(Answer):
         return str(capacity(self.profile)).partition("\n\n")[0].splitlines()
 
     def _unknown(self) -> tuple[str, ...]:
-        """Values that nobody has measured or configured, those of groups and of messages together."""
+        """Values that nobody has measured or configured; groups share a line, and messages do."""
         unknown: dict[str, dict[str, None]] = {}
         for row in self.rows:
             if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade", "period_grade"):
@@ -125,7 +125,7 @@ def import_profile(
     period_us
         Period of every message that no file gives one; it is assumed, so the plan is not shown to fit [us].
     progress
-        Called with the bytes read of a log and those of the file.
+        Called with the bytes read of a log and the size of the file [bytes].
 
     Returns
     -------
@@ -186,7 +186,7 @@ def _validated(text: str, machine: Reading) -> Profile:
 
 
 def _time_beyond(profile: Profile, machine: Reading) -> ProfileLine | None:
-    """Time that the frames of a file take beyond those of the profile; None where they take none."""
+    """Time by which the frames of a file are longer than the frames of the profile; None if they are not."""
     frames = machine.bus["frames"]
     file_us = sum(map(ethercat.frame_us, frames.value))
     terms = deciding_cycle(network_of(profile)).terms
@@ -194,12 +194,12 @@ def _time_beyond(profile: Profile, machine: Reading) -> ProfileLine | None:
     subject = "its frame takes" if len(frames.value) == 1 else f"its {len(frames.value)} frames take"
     words = f"{machine.file}: {subject} {file_us:.2f} us on the wire"
     if file_us < planned_us - _ROUNDING_US:
-        machine.remarks.append(f"{words}, those of the profile {planned_us:.2f} us")
+        machine.remarks.append(f"{words}, the profile's frames {planned_us:.2f} us")
         return None
-    machine.remarks.append(f"{words}, as those of the profile")
+    machine.remarks.append(f"{words}, as the profile has")
     if file_us < planned_us + _ROUNDING_US:
         return None
     notes = [ethercat.SLOWER] if "slower" in machine.bus else []
-    notes.append(f"{len(frames.value)} frames take so much more than those of the model")
+    notes.append(f"time by which {len(frames.value)} frames are longer than the model's")
     us = round(profile.cycle.nonperiodic_us + file_us - planned_us, 6)
     return ProfileLine("cycle", "nonperiodic_us", Fact(us, frames.place, note="; ".join(notes)))

@@ -35,12 +35,12 @@ _CLEARLY: Final = 0.02
 """By how much a recorded period is shorter than that of a database where it counts, as a share."""
 _DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
 _USUAL_BIT_RATE: Final = 1000
-"""Of machines [kbit/s]."""
+"""Bit rates of machines [kbit/s]."""
 _USUAL_OF_CARS: Final = 500
-"""Of networks of messages alone [kbit/s]."""
+"""Bit rates of networks of messages alone [kbit/s]."""
 _LISTED: Final = 8
 _NAMES_OF_CYCLE: Final = ("SYNC", "loop", "feedback", "command")
-_OF_A_MESSAGE: Final = ("payload_bytes", "period_us", "period_grade", "jitter_us", "burst", "deadline_us")
+_OF_A_MESSAGE: Final = ("sender", "payload_bytes", "period_us", "period_grade", "jitter_us", "burst", "deadline_us")
 _ASSUME: Final = "a log of the bus beside it shows it, and --period 100ms takes one for all such messages, as assumed"
 _BASE_BITS: Final = 11
 _EXTENDED_BITS: Final = 29

@@ -86,14 +86,17 @@ def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None)
         if number in machine.messages:
             owner = machine.messages[number]["name"].value
             raise machine.refusal(line, f"message {message.name} has the identifier of {owner}: a bus has each once")
-        facts = machine.messages[number] = {
-            "name": machine.fact(message.name, line),
-            "payload_bytes": machine.fact(message.length, line),
+        values = {
+            "name": message.name,
+            "payload_bytes": message.length,
+            # One of several may not be told from the others.
+            "sender": message.senders[0] if len(message.senders) == 1 else None,
+            "is_fd": message.is_fd or None,
+            "period_us": message.cycle_time * _KILO if message.cycle_time else None,
         }
-        if message.is_fd:
-            facts["is_fd"] = machine.fact(True, line)
-        if message.cycle_time:
-            facts["period_us"] = machine.fact(message.cycle_time * _KILO, line)
+        machine.messages[number] = {
+            key: machine.fact(value, line) for key, value in values.items() if value is not None
+        }
     return machine
 
 

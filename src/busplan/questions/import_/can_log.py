@@ -72,7 +72,7 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
     channel
         Of several channels, the name of the one that is read.
     progress
-        Called with the bytes read and those of the file.
+        Called with the bytes read and the size of the file [bytes].
 
     Raises
     ------
@@ -80,6 +80,8 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
         The extra is not installed, or it is no log of one channel that shows when frames come.
     """
     frames = read_can(path, channel=channel, progress=progress)
+    if frames.synthetic:
+        raise BusplanError(f"{name}: is {frames.synthetic}: it measures no machine, and its profile is there already")
     stretch = longest_stretch(frames)
     messages = frames_by_identifier(frames, stretch).values()
     least = least_bit_rate(frames, stretch).likely

@@ -92,7 +92,7 @@ def _datagrams(bus: Facts) -> Facts:
         constants, further = kind_named("ethercat").constants, bus["further_datagrams"]
         sizes = (constants[f"{name}[{bus['master'].value}]"] for name in ("HOUSEKEEPING_BYTES", "CLOCK_BYTES"))
         data = [*(int(size - constants["DATAGRAM_BYTES"]) for size in sizes), *[0] * further.value]
-        note = f"those of the master, and 0 for the header of each further datagram of {further.note}"
+        note = f"the master's datagrams, and 0 for the header of each further datagram of {further.note}"
         facts["housekeeping_bytes"] = further._replace(value=data, grade="derived", note=note)
     return facts
 

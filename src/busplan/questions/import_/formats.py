@@ -29,7 +29,7 @@ def read_machine(argument: str, *, bus: str | None, channel: str | None, progres
     bus, channel
         Name of the bus of a database, and of the channel of a log.
     progress
-        Called with the bytes read of a recording and those of its file.
+        Called with the bytes read of a recording and the size of its file [bytes].
 
     Raises
     ------
@@ -78,7 +78,7 @@ def recognised(content: bytes, *, name: str) -> Format:
     if tag := root_tag(content):
         if tag in _ELSEWHERE:
             raise BusplanError(f"{name}: {_ELSEWHERE[tag]}")
-        what = f"XML with a root <{tag[:60]}>, which is "
+        what = f"XML with a root <{tag[:60]}>, "
     elif not content.startswith(UTF_16) and b"\0" in content[:100_000]:
         what = "binary data, "
-    raise BusplanError(f"{name}: {what}none of what is looked for: {'; '.join(each.title for each in FORMATS)}")
+    raise BusplanError(f"{name}: {what}no format that busplan imports: {'; '.join(each.title for each in FORMATS)}")

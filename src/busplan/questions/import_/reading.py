@@ -1,4 +1,4 @@
-"""What files say of a machine: facts with their places, those of several files together, and lines of a profile."""
+"""Facts of a machine with their places in files, merged over several files, and lines of a profile."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -284,7 +284,7 @@ def profile_text(rows: Sequence[ProfileLine], *, name: str, readings: Sequence[R
     Parameters
     ----------
     rows
-        Its lines, those of a section side by side.
+        Lines of the profile; the lines of a section stand together.
     name
         Name of the profile.
     readings

@@ -256,7 +256,7 @@ def _option(goal: Network, step: PlanStep, number: int) -> Option:
 
 
 def _relaxations(goal: Network, levels: Sequence[Freedom], kept: Sequence[str]) -> Iterator[Relaxation]:
-    """Further freedoms that would each be enough, those of values that are kept among them."""
+    """Further freedoms that would each be enough, kept values included."""
     names = {level.name for level in levels}
     for freedom in freedoms(goal):
         if freedom.name not in names:

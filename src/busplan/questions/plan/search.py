@@ -270,9 +270,9 @@ class PlanStep(NamedTuple):
     """A step of a plan: what was freed, and the changes that came nearest."""
 
     freedom: Freedom | None
-    """None of the network as it is."""
+    """The freedom that was used last; None for the network as it is."""
     changes: Changes
-    """All changes so far by dotted key, those of the last freedom first."""
+    """All changes so far by dotted key, the last freedom first."""
     unmet: tuple[Need, ...]
     """Constraints that do not hold with them."""
 
@@ -304,8 +304,8 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     network
         The network.
     names
-        Names of freedoms; None for those of the bus's registers, the slice ratio and the period; of a network without a
-        cycle all.
+        Names of freedoms; None for the bus's registers, the slice ratio and the period, or for all of them in a network
+        without a cycle.
     kept
         Keys that were given a value, which stays.
 

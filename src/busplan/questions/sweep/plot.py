@@ -121,7 +121,7 @@ class Plotted(NamedTuple):
 
     figure: Figure
     scales: tuple[PlotScale, ...]
-    """Of two, the first is the y axis and the second the x axis."""
+    """Keys that vary; with two, the first is the y axis and the second the x axis."""
     panels: tuple[SweptModel, ...]
     """One for each timing model that has the figure."""
     safety: str

@@ -171,7 +171,7 @@ def figure_names(network: Network) -> tuple[str, ...]:
 
 
 def column_figures(network: Network) -> dict[str, Figure]:
-    """The registered figures of a sweep's columns, those of groups with the name of the group."""
+    """Registered figures of a sweep's columns; a group's figure has the name of the group."""
     figures = by_key((*CIRCLE_FIGURES, *SUMMARY_FIGURES, *network.bus.figures.capacity))
     groups = {
         f"group.{group.name}.{key}": figures[key]._replace(label=f"{figures[key].label} of {group.name}")

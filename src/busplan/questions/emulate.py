@@ -1,0 +1,162 @@
+"""`busplan.emulate`: the recording which the planned machine would give, so that software is tried before it exists."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import ceil
+from random import Random
+from types import MappingProxyType
+
+from busplan import __version__
+from busplan.buses import kind_named, kind_names
+from busplan.buses.emulation import TIMES, Emulation, Emulator, Fault
+from busplan.english import did_you_mean, listed, plural
+from busplan.errors import BusplanError
+from busplan.forms.blocks import Code, Report, Sentence
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import ProfileLike, finite, load_network, whole
+from busplan.questions.base.sentences import document, fields, with_profile
+from busplan.questions.fit.network import bus_of
+from busplan.sections.profile import Profile
+
+_CYCLES = 1000
+"""Cycles of a recording by default."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class EmulateAnswer(Answer):
+    """Answer of `emulate`: a synthetic recording, which `save` writes.
+
+    Parameters
+    ----------
+    profile
+        The plan.
+    content
+        The recording, in the format of its kind of bus.
+    cycles
+        Its length; of messages alone in periods of the fastest.
+    duration_us
+        The same [us].
+    seed
+        Seed of its random numbers.
+    faults
+        Value of each fault, by name: how often, or how late [us].
+    """
+
+    profile: Profile
+    content: bytes
+    cycles: int
+    duration_us: float
+    seed: int
+    faults: Mapping[str, float]
+
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        recordings = dict.fromkeys(emulator_of(self.profile).endings, lambda: self.content)
+        return {**Answer._contents(self), **recordings}  # noqa: SLF001 - super() knows no class with slots made anew
+
+    def report(self) -> Report:
+        """What is in the recording."""
+        name, emulator = self.profile.name, emulator_of(self.profile)
+        length = f"{plural(self.cycles, 'cycle')}, {self.duration_us / 1e6:g} s, seed {self.seed}"
+        lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It counts as no measurement."))]
+        records = []
+        for fault, value in ((fault_named(emulator, key), value) for key, value in self.faults.items()):
+            often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
+            lines.append(Sentence((f"{fault.name}: {fault.words}, {often}; measured shows {fault.shown_as}.",)))
+            records.append({"value": value, **fields(fault, "name", "unit", "shown_as")})
+        content = document("emulate", profile=name, **fields(self, "cycles", "duration_us", "seed"), faults=records)
+        return Report(Sentence(("Emulated ", Code(name))), lines, content, with_profile(name, records))
+
+
+def emulate(
+    profile: ProfileLike,
+    *,
+    cycles: int | None = None,
+    duration_us: float | None = None,
+    seed: int = 1,
+    fault: Mapping[str, float | None] | None = None,
+) -> EmulateAnswer:
+    """Emulate the planned machine: the recording that it would give. `busplan emulate`.
+
+    EtherCAT gives a capture of the master's port (pcapng), CAN a log of candump. The file says that it is synthetic.
+
+    Parameters
+    ----------
+    profile
+        The plan: a `Profile`, a path or a shipped name.
+    cycles
+        Cycles of the recording; of messages alone, periods of the fastest. By default 1,000.
+    duration_us
+        Instead of it, a time [us].
+    seed
+        Of the random numbers; the same seed gives the same bytes.
+    fault
+        Faults of the machine by name, each with its value: how often, or how late [us]; None for its default.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, a kind of bus without recordings, an unknown fault, one that has no place, or too many frames.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.emulate("can-servo-8", cycles=2)
+    >>> answer.content[:34]
+    b'(0000000000.000051) synthetic 080#'
+    """
+    network = load_network(profile)
+    emulator = emulator_of(network.profile)
+    period_us = emulator.period_us(network)
+    if cycles is not None and duration_us is not None:
+        raise BusplanError("cycles and duration_us: give one of them")
+    if duration_us is not None:
+        cycles = ceil(finite(duration_us, name="duration_us") / period_us)
+    number = whole(_CYCLES if cycles is None else cycles, name="cycles")
+    if not isinstance(fault, Mapping | None):
+        raise BusplanError(f'fault {fault!r}: expected values by name, as {{"jitter": 50}}')
+    values = {name: _value(fault_named(emulator, name), value, period_us) for name, value in (fault or {}).items()}
+    random = Random(whole(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
+    origin = f"emulated by busplan {__version__} from {network.profile.name}"
+    content = emulator.emulated(network, Emulation(number, random, values, origin))
+    return EmulateAnswer(network.profile, content, number, number * period_us, seed, MappingProxyType(values))
+
+
+def emulator_of(profile: Profile) -> Emulator:
+    """What the kind of bus of a profile emulates.
+
+    Raises
+    ------
+    BusplanError
+        Nothing.
+    """
+    emulator = bus_of(profile).emulator()
+    if emulator is None:
+        kinds = listed([name for name in kind_names() if kind_named(name).emulator()], "and")
+        raise BusplanError(f"no recording of bus.kind {profile.bus.kind} is emulated, for none is read; {kinds} are")
+    return emulator
+
+
+def fault_named(emulator: Emulator, name: str) -> Fault:
+    """A fault that can be emulated.
+
+    Raises
+    ------
+    BusplanError
+        It has none of that name.
+    """
+    faults = {fault.name: fault for fault in emulator.faults}
+    if name not in faults:
+        hints = "; ".join(filter(None, (f"there are {', '.join(faults)}", did_you_mean(str(name), faults))))
+        raise BusplanError(f"fault {name}: no such fault of this kind of bus; {hints}")
+    return faults[name]
+
+
+def _value(fault: Fault, value: object, period_us: float) -> float:
+    """Value of a fault: how often, or how late [us]."""
+    name = f"fault {fault.name}"
+    if fault.unit == "1":
+        return whole(int(fault.default) if value is None else value, name=name)
+    late_us = fault.default * period_us if value is None else finite(value, name=name)
+    if late_us <= 0:
+        raise BusplanError(f"{name}: {late_us:g}; expected a time above zero")
+    return late_us

@@ -1,0 +1,102 @@
+"""Queues that are not by priority: what is known of them, what the verdict says, and the equality with Davis 2007."""
+
+from typing import Any
+
+import pytest
+
+import busplan
+from tests.buses.can.machines import figures, loaded, responses
+from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
+
+
+def changed(**changes: Any) -> busplan.Profile:
+    """The shipped profile with some keys changed, __ for the dot."""
+    return busplan.load_profile(
+        "can-servo-8", changes={key.replace("__", "."): value for key, value in changes.items()}
+    )
+
+
+def test_queues_by_priority_have_the_responses_of_davis_2007() -> None:
+    assert responses(changed(bus__queue="priority")) == responses(changed())
+    assert responses(changed(node__queue="priority", bus__queue="fifo")) != responses(changed())
+
+
+def network(*messages: dict[str, Any], **bus: Any) -> busplan.Profile:
+    """Messages alone of 130 us each, the first goes first."""
+    each = [
+        {"name": f"m{place}", "identifier": place, "payload_bytes": 8, "period_us": 10_000, **keys}
+        for place, keys in enumerate(messages)
+    ]
+    bus = {"kind": "can", "bit_rate_kbit_s": 1000, **bus}
+    return loaded({"schema_version": 1, "name": "queues", "bus": bus, "message": each})
+
+
+def test_a_message_waits_for_all_of_its_queue_and_all_that_those_wait_for() -> None:
+    # m0 and m3 share a queue: m0 may wait for a frame that blocks, for m1, m2 and m3, and goes itself.
+    found = responses(network({"sender": "a"}, {}, {}, {"sender": "a"}, {}, queue="fifo"))
+    assert found["m0"] == found["m3"] == 5 * 135
+    # To m1 its queue offers m0 up to 4 frames late, which is far from its next period: it is one frame all the same.
+    assert found["m1"] == 3 * 135
+    by_priority = responses(network({"sender": "a"}, {}, {}, {"sender": "a"}, {}))
+    assert by_priority["m0"] == 2 * 135
+
+
+def test_what_was_held_up_in_a_queue_comes_twice_in_short_time() -> None:
+    keys = {"k": (10, 700, "a"), "m": (50, 10_000, ""), "x": (100, 50_000, "a")}
+    keys |= {f"y{number}": (60 + number, 50_000, "") for number in range(4)}
+    sent = [
+        {"name": name, "identifier": identifier, "period_us": period_us, **({"sender": sender} if sender else {})}
+        for name, (identifier, period_us, sender) in keys.items()
+    ]
+    # x is behind all y, and k behind x. As x starts m comes, and behind x both k.
+    queued_us = {**dict.fromkeys(keys, (0,)), "k": (1, 701), "m": (4 * 135 + 1,)}
+    messages = [
+        SimulatedMessage(Frame(identifier, 135), queued_us[name], queued_us[name], sender or name)
+        for name, (identifier, _, sender) in keys.items()
+    ]
+    run = simulate(Frame(0, 1), (), messages, period_us=1, host_us=(), orders={"a": None})
+    (response_us,) = run.responses_us[list(keys).index("m")]
+    assert response_us == 4 * 135 - 1
+    assert responses(network(*sent, queue="fifo"))["m"] == 4 * 135
+    assert responses(network(*sent, queue="priority"))["m"] == 3 * 135
+
+
+@pytest.mark.parametrize("order", ["fifo", "single-buffer"])
+def test_a_deadline_missed_by_the_bound_alone_is_not_shown(order: str) -> None:
+    sent = ({"sender": "a", "deadline_us": 500}, {"sender": "b"}, {"sender": "b"}, {"sender": "a"}, {"sender": "b"})
+    assert figures(network(*sent, queue="priority")).verdict == "fits"
+    assert figures(network(*sent, queue=order)).verdict == "not shown to fit"
+    # Its own frame is later than this.
+    late = ({**sent[0], "deadline_us": 100}, *sent[1:])
+    assert figures(network(*late, queue=order)).verdict == "does not fit"
+
+
+def test_a_cycle_too_long_by_the_queues_alone_is_not_shown() -> None:
+    own = {"cycle__period_us": 3500, "limits__max_load": 0.99}
+    # Five frames of a drive may be before its feedback, whatever their priority.
+    more = {f"message__sdo-response__{key}": value for key, value in {"burst": 5, "period_us": 4000}.items()}
+    assert figures(changed(**own, **more)).verdict == "fits"
+    found = figures(changed(**own, **more, node__queue="fifo"))
+    assert (found.verdict, found.required_us > 3500) == ("not shown to fit", True)
+
+
+def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority() -> None:
+    known = network({"sender": "a"}, {"sender": "b"}, queue="fifo")
+    assert figures(known).verdict == "fits"
+    unknown = network({"sender": "a"}, {}, queue="fifo")
+    assert figures(unknown).verdict == "not shown to fit"
+    assert "m1: who sends it is not known" in str(busplan.capacity(unknown).to_dict()["verdicts"][0]["lines"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "priority queues: assumed"),
+        ({"bus__queue": "priority"}, "queues: priority"),
+        ({"node__queue": "fifo"}, "queues: fifo, others by priority: assumed"),
+        ({"bus__queue": "priority", "node__queue": "single-buffer"}, "queues: priority and single-buffer"),
+    ],
+)
+def test_the_card_says_what_is_known_of_queues(changes: dict[str, Any], words: str) -> None:
+    lines = busplan.capacity(changed(**changes)).to_dict()["verdicts"][0]["lines"]
+    assert {"label": "rests on", "text": f"{words}; no repeated frames"} in lines
