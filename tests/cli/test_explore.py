@@ -121,7 +121,7 @@ def test_circles_are_shown_where_the_cycle_fits(run: Run, tmp_path: Path) -> Non
     ("arguments", "message"),
     [
         (("--over", "payload.write_bytes"), "--over payload.write_bytes: expected KEY=VALUES"),
-        (("--over", "bus.nods=1"), "over bus.nods: no such key of this profile; did you mean bus.nodes?"),
+        (("--over", "bus.nods=1"), "over bus.nods: unknown key; did you mean nodes?"),
         (("--x", "bus.nodes=1:33"), "bus.nodes: 33 values; a slider has up to 32. A map or a sweep takes more"),
         (
             ("--x", "bus.nodes=1:32", "--y", "bus.gap_count=30:61", "--over", "payload.write_bytes=4:28:4"),

@@ -37,7 +37,7 @@ def test_circles_are_run_here_or_by_workers(busplan: Run, tmp_path: Path, monkey
     [
         (("--x", "bus.nodes"), "--x bus.nodes: expected KEY=VALUES, as bus.nodes=1:62"),
         (("--y", "cycle.period_us=fast"), "y cycle.period_us=fast: 'fast' is not a number"),
-        (("--x", "bus.nods=1:3"), "x bus.nods: no such key of this profile; did you mean bus.nodes?"),
+        (("--x", "bus.nods=1:3"), "x bus.nods: unknown key; did you mean nodes?"),
         (("--x", "node=1"), "x node: "),
         (("--x", "bus.nodes=1:100"), "x bus.nodes: 100 values; a map shows up to 64 of a key"),
         (("--x", "bus.gap_count=64,65"), "no setting of this map can exist: bus.gap_count 64: expected a whole number"),

@@ -53,8 +53,6 @@ class Key(NamedTuple):
     """Best grade that its value can have, if below the grade "given"."""
     meaning: str = ""
     """What a change of it means on the machine, where the key does not say it."""
-    short: str = ""
-    """Format of its value in a table of plans."""
     chooses: bool = False
     """Whether its value selects a formula: a derivation then lists it among its inputs."""
     role: KeyRole | None = None

@@ -85,8 +85,6 @@ class Command(NamedTuple):
     """A shell command."""
 
     line: str
-    purpose: str = ""
-    """Its output, in a few words."""
 
 
 Part = str | ShownValue | Words | Code
@@ -150,12 +148,6 @@ class Table(NamedTuple):
     """How many of the first columns name a row; they are repeated where a narrow terminal continues the table below."""
 
 
-class Facts(NamedTuple):
-    """A line of named figures."""
-
-    items: tuple[tuple[str, ShownValue | Code], ...]
-
-
 class Chart(NamedTuple):
     """A drawing with a caption."""
 
@@ -166,10 +158,9 @@ class Chart(NamedTuple):
 
 
 class Snippet(NamedTuple):
-    """Lines for the reader to copy into a file."""
+    """Lines of TOML for the reader to copy into a file."""
 
     lines: tuple[str, ...]
-    language: str = "toml"
 
 
 class CalculationStep(NamedTuple):
@@ -186,15 +177,6 @@ class Calculation(NamedTuple):
     """A derivation."""
 
     steps: tuple[CalculationStep, ...]
-
-
-class Question(NamedTuple):
-    """A question, its answer in a word or two, the reasons, and the main figures."""
-
-    question: str
-    answer: Words
-    sentences: tuple[Sentence, ...]
-    facts: Facts
 
 
 class Gauge(NamedTuple):
@@ -288,9 +270,7 @@ class Chapter(NamedTuple):
     """Whether a screen shows its title alone until it is opened; print shows all."""
 
 
-Block = (
-    Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Explorer | Detail | Chapter
-)
+Block = Sentence | Table | Chart | Command | Snippet | Calculation | Card | Explorer | Detail | Chapter
 
 
 class Report(NamedTuple):

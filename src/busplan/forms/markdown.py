@@ -16,9 +16,7 @@ from busplan.forms.blocks import (
     Code,
     Command,
     Explorer,
-    Facts,
     Part,
-    Question,
     Report,
     SectionLink,
     Sentence,
@@ -136,22 +134,15 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
         case Sentence():
             words = _sentence(block)
             yield f"**{words}**" if block.state in ("passes", "fails") else words
-        case Facts():
-            yield f"{_facts(block)}."
         case Table():
             yield from _caption(block.caption)
             yield from _table(block)
         case Chart():
             yield from _chart(block)
         case Snippet():
-            yield from (f"```{block.language}", *block.lines, "```")
+            yield from ("```toml", *block.lines, "```")
         case Calculation():
             yield from _steps(block)
-        case Question():
-            yield from (f"**{escaped(block.question)} {escaped(block.answer.text)}.**", "")
-            yield from (f"- {_sentence(words)}" for words in block.sentences)
-            if block.facts.items:
-                yield from ("", f"{_facts(block.facts)}.")
         case Card():
             yield from (f"{_sentence(block.subject)}: **{escaped(block.verdict.text)}**", "")
             rows = ([escaped(label), _cell(words)] for label, words in block.lines)
@@ -177,10 +168,6 @@ def _chart(chart: Chart) -> Iterator[str]:
 
 def _caption(caption: Sentence | None) -> tuple[str, ...]:
     return (f"{_sentence(caption).removesuffix('.')}:", "") if caption else ()
-
-
-def _facts(facts: Facts) -> str:
-    return ", ".join(f"{escaped(name)} {_part(value)}" for name, value in facts.items)
 
 
 def _sentence(sentence: Sentence) -> str:

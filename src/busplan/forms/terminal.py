@@ -15,9 +15,7 @@ from busplan.forms.blocks import (
     Command,
     Detail,
     Explorer,
-    Facts,
     Gauge,
-    Question,
     Report,
     Sentence,
     ShownValue,
@@ -26,7 +24,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Lane, Lanes, Panel, Ruler, legend
 from busplan.forms.lines import BLANK, Line, Mark, legend_lines, plain_text, styled_text, wrapped
-from busplan.forms.numbers import part_text, sentence_line, with_unit
+from busplan.forms.numbers import sentence_line, with_unit
 from busplan.forms.scale import placed
 from busplan.forms.text_table import table_lines
 
@@ -234,16 +232,13 @@ def block_lines(
 
 def _belong(block: Block, following: Block) -> bool:
     """Whether no blank line separates two blocks."""
-    return any(isinstance(block, kind) and isinstance(following, kind) for kind in (Sentence | Facts, Command))
+    return any(isinstance(block, kind) and isinstance(following, kind) for kind in (Sentence, Command))
 
 
 def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) -> Sequence[Line]:
     match block:
         case Sentence():
             return wrapped(sentence_line(block), width)
-        case Facts():
-            facts = ", ".join(f"{name} {part_text(value)}" for name, value in block.items)
-            return wrapped(Line(f"{facts}."), width) if facts else []
         case Table():
             lines = table_lines(block, width=width, is_whole=is_whole, whole_by=whole_by)
             return [*_caption(block.caption, width), *lines]
@@ -258,10 +253,6 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
             return [Line(line, "drawn") for line in block.lines]
         case Calculation():
             return [line for number, step in enumerate(block.steps, start=1) for line in _step(number, step, width)]
-        case Question():
-            head = Line(f"{block.question} {block.answer.text}", block.answer.state)
-            inside: tuple[Block, ...] = (*block.sentences, block.facts)
-            return [*wrapped(head, width), *block_lines(inside, width=width)]
         case Card():
             return _card_lines(block, width)
         case Detail():

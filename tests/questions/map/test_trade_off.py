@@ -243,7 +243,7 @@ def test_a_direction_is_sorted_and_has_no_more_values_than_gap_counts() -> None:
     assert len(busplan.map_(PAPER, x={"bus.gap_count": range(64)}, y={PERIOD: [4000]}).x.values) == 64
     for x, message in (
         ({"bus.nodes": range(1, 66)}, "x bus.nodes: 65 values; a map shows up to 64 of a key"),
-        ({"bus.node": [1]}, "x bus.node: no such key of this profile; did you mean bus.nodes?"),
+        ({"bus.node": [1]}, "x bus.node: unknown key; did you mean nodes?"),
         ({"circle.radius_mm": [1]}, "add circle to run circle tests"),
     ):
         with pytest.raises(busplan.BusplanError, match=re.escape(message)):

@@ -200,7 +200,7 @@ def test_columns_that_are_not_there_or_no_numbers_are_refused() -> None:
 def test_what_makes_no_sweep_is_refused() -> None:
     cases: list[tuple[Any, Any, str]] = [
         ({}, {}, "vary {}: expected keys of the profile and their values"),
-        ({"bus.nods": [1]}, {}, "vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
+        ({"bus.nods": [1]}, {}, "vary bus.nods: unknown key; did you mean nodes?"),
         ({"bus.nodes": []}, {}, "vary bus.nodes: no values; give at least one"),
         ({"bus.nodes": range(0)}, {}, "vary bus.nodes: no values; give at least one"),
         ({"bus.nodes": 3}, {}, "vary bus.nodes 3: expected several values, as a list"),

@@ -143,19 +143,16 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
         "bus.access": Key(chooses=True, meaning="if the host's software can"),
-        "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough", short="{} kbit/s"),
-        "bus.data_bit_rate_kbit_s": Key(
-            "f_data", meaning="if transceivers and cable carry it", short="{} kbit/s of data"
-        ),
-        "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit", short="identifiers of {} bits"),
+        "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough"),
+        "bus.data_bit_rate_kbit_s": Key("f_data", meaning="if transceivers and cable carry it"),
+        "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit"),
         "bus.host_us": Key("host"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default=SYNC_IDENTIFIER),
         "limits.max_load": Key(default=MAX_LOAD),
-        "payload.pdo_per": Key(short="PDOs of each {}"),
-        "payload.every": Key("every", short="PDOs every {} cycles"),
+        "payload.every": Key("every"),
         "node.execution.worst_extra_us": Key("T_extra"),
         "message.payload_bytes": Key("s"),
         "message.period_us": Key("T"),

@@ -246,7 +246,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         "bus.master_jitter_us": Key("J"),
         "bus.mailbox_polls": Key("polls"),
         "bus.mailbox_bytes": Key("B", MAILBOX_BYTES),
-        "bus.sync_shift": Key("shift", SYNC_SHIFT, meaning="drives act, and sample, later", short="SYNC0 at {}"),
+        "bus.sync_shift": Key("shift", SYNC_SHIFT, meaning="drives act, and sample, later"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
         "bus.distributed_clocks": Key(role="clock"),
         "node.cable_m": Key("L", role="cable"),

@@ -137,7 +137,7 @@ class Polled(Bus):
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.protocol": Key(chooses=True),
         "bus.nodes": Key(meaning="the others on a second bus"),
-        "bus.bit_rate_kbit_s": Key("f", meaning="in every node", short="{} kbit/s"),
+        "bus.bit_rate_kbit_s": Key("f", meaning="in every node"),
         "bus.requests": Key(chooses=True, meaning="if the host's software can"),
         "bus.return_delay_us": Key("t_delay", meaning="in every node"),
         "bus.adapter_us": Key("t_adapter", grade="assumed"),

@@ -110,7 +110,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "bus.master_delay_us": Key("t_master", MASTER_DELAY_US),
         "bus.component_delay_us": Key("t_comp", COMPONENT_DELAY_US),
         "bus.at_start_us": Key("t_1,min"),
-        _METHOD: Key(meaning="a setting of the master", short="method {}"),
+        _METHOD: Key(meaning="a setting of the master"),
         **KEYS,
     }
     evidence_data = ("sercos3",)

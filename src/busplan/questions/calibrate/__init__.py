@@ -20,6 +20,7 @@ from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, me
 from busplan.profile.sources import locate_measurements
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_network
+from busplan.questions.fit.network import OfNetwork
 from busplan.sections.base import TransactionKind
 from busplan.sections.cycle import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
 from busplan.sections.machine import ProfileGroup
@@ -191,7 +192,7 @@ Measurements = Path | bytes | Columns | Iterable[Mapping[str, Any]] | Iterable[I
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CalibrateAnswer(Answer):
+class CalibrateAnswer(OfNetwork, Answer):
     """Answer of `calibrate`; times are in us.
 
     Parameters
@@ -237,12 +238,6 @@ class CalibrateAnswer(Answer):
     worst_extra_us: float | None
     at_most_us: float
     section: dict[str, object]
-
-    @property
-    def profile(self) -> Profile:
-        """The profile that was measured."""
-        profile: Profile = self.network.profile
-        return profile
 
     @property
     def key(self) -> str:

@@ -19,7 +19,7 @@ from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_seve
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
 from busplan.questions.fit.inputs import assumed_rates, given
-from busplan.questions.fit.network import at_period, changed, network_of, varied_nodes
+from busplan.questions.fit.network import OfNetwork, at_period, changed, network_of, varied_nodes
 from busplan.questions.plan.search import (
     SettingForPeriod,
     SmallestPeriod,
@@ -114,7 +114,7 @@ class NotOnKind(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CompareAnswer(Answer):
+class CompareAnswer(OfNetwork, Answer):
     """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
 
     Parameters
@@ -128,12 +128,6 @@ class CompareAnswer(Answer):
 
     network: Network
     kinds: tuple[MachineOnKind | NotOnKind, ...]
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
 
     @property
     def compared(self) -> tuple[MachineOnKind, ...]:
@@ -218,7 +212,10 @@ def compare(
         if name not in kinds:
             near = did_you_mean(name, kinds)
             raise BusplanError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
-    machines = [_on_kind(network, name) for name in dict.fromkeys(names) if not _is_own_variant(network, name)]
+    # A variant that the profile has anyway is its own kind.
+    title = variant_called(network.bus.title_of(network))
+    is_own = {name for name in network.bus.starter.variants if name == title}
+    machines = [_on_kind(network, name) for name in dict.fromkeys(names) if name not in is_own]
     smallest_us = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
     periods_us = _curve_periods(network.profile.cycle.period_us, smallest_us)
     with_curves = (
@@ -230,12 +227,6 @@ def compare(
         for machine in machines
     )
     return CompareAnswer(network, tuple(with_curves))
-
-
-def _is_own_variant(network: Network, name: str) -> bool:
-    """Whether a variant is what the profile has anyway."""
-    bus = network.bus
-    return name in bus.starter.variants and variant_called(bus.title_of(network)) == name
 
 
 def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:

@@ -18,7 +18,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_network
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
-from busplan.questions.fit.network import model_names, network_of
+from busplan.questions.fit.network import OfNetwork, model_names, network_of
 from busplan.questions.plan.search import missed_limits
 from busplan.sections.profile import Profile
 
@@ -64,7 +64,7 @@ class ComparedFigure:
 
 
 @dataclass(frozen=True)
-class DiffSide:
+class DiffSide(OfNetwork):
     """One of the two profiles."""
 
     argument: str
@@ -74,12 +74,6 @@ class DiffSide:
     """Figures of the timing model that decides."""
     missed_limits: tuple[str, ...]
     """Keys of [limits] that are not kept."""
-
-    @property
-    def profile(self) -> Profile:
-        """The profile."""
-        profile: Profile = self.network.profile
-        return profile
 
     @property
     def verdict(self) -> VerdictWord | None:

@@ -15,6 +15,19 @@ from busplan.sections.profile import Profile
 PERIOD: Final = "cycle.period_us"
 
 
+class OfNetwork:
+    """What is about a network, and so about its profile."""
+
+    __slots__ = ()
+    network: Network
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
+
 def bus_of(profile: Profile) -> Bus:
     """The kind of bus that a profile describes."""
     return kind_named(profile.bus.kind)

@@ -24,7 +24,7 @@ from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import figures, limits_behind, safe_nodes, shortest_period_us
-from busplan.questions.fit.network import PERIOD, at_period, changed, varied_nodes
+from busplan.questions.fit.network import PERIOD, OfNetwork, at_period, changed, varied_nodes
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (
     MOST_CIRCLES_UNASKED,
@@ -111,7 +111,7 @@ class Region(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class MapAnswer(Answer):
+class MapAnswer(OfNetwork, Answer):
     """Answer of `map_`: where a design fits as two keys vary. A notebook shows it as a picture.
 
     Parameters
@@ -131,12 +131,6 @@ class MapAnswer(Answer):
     y: Direction
     rows: tuple[tuple[Cell | NotDrawn, ...], ...]
     with_circle: bool
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
 
     @property
     def cells(self) -> tuple[Cell, ...]:

@@ -8,6 +8,7 @@ from busplan.buses.limits import Value
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
+from busplan.forms.numbers import sentence_text
 from busplan.profile.changes import KeyChange, KeyChanges
 from busplan.profile.edit import whole as as_whole
 from busplan.profile.kinds import flat
@@ -23,7 +24,7 @@ from busplan.questions.base.inputs import (
     whole,
 )
 from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
-from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
+from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
 from busplan.questions.plan.search import (
     Changes,
     Freedom,
@@ -41,7 +42,7 @@ from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True)
-class Option:
+class Option(OfNetwork):
     """A step of the search: what was changed so far, and what it gives."""
 
     title: str
@@ -56,12 +57,6 @@ class Option:
     held_by: str | None
     """Key of the constraint that it breaks most; None where all hold."""
     recommended: bool
-
-    @property
-    def profile(self) -> Profile:
-        """The goal with the changes."""
-        profile: Profile = self.network.profile
-        return profile
 
 
 @dataclass(frozen=True)
@@ -133,7 +128,7 @@ class PlanAnswer(Answer):
 
         changes = {key: as_whole(value) for key, value in (self.recommended_changes or {}).items()}
         written: dict[str, Any] = dict(flat(changes))
-        return settings(self.goal, written)
+        return sentence_text(settings(self.goal, written))
 
     def report(self) -> Report:
         """The answer in blocks."""

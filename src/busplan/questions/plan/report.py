@@ -1,10 +1,8 @@
 """Answer of `busplan plan`: its sentences, the table of its options, and its document."""
 
 from collections.abc import Iterator
-from typing import Final
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
-from busplan.buses.limits import Value as BusValue
 from busplan.buses.network import Network
 from busplan.elementwise import plain
 from busplan.english import listed, nouns
@@ -23,10 +21,8 @@ from busplan.forms.blocks import (
     Words,
     attribute_value,
     figure_value,
-    joined,
-    sentence,
 )
-from busplan.forms.numbers import MISSING, period_value, sentence_text
+from busplan.forms.numbers import MISSING, period_value
 from busplan.profile.kinds import flat
 from busplan.questions.base.sentences import (
     NewValues,
@@ -81,20 +77,17 @@ def _blocks(plan: PlanAnswer) -> Iterator[Block]:
     yield Sentence((f"{mark}'Held by' is what keeps a row from fitting.{circle}",))
 
 
-def settings(network: Network, changes: NewValues) -> str:
+def settings(network: Network, changes: NewValues) -> Sentence:
     """Write changes as in a profile.
 
     Examples
     --------
+    >>> from busplan.forms.numbers import sentence_text
     >>> from busplan.profile.sources import load
     >>> from busplan.questions.fit.network import network_of
-    >>> settings(network_of(load("paper-4ms").profile), {"bus.nodes": 20, "bus.speed": "S400"})
+    >>> sentence_text(settings(network_of(load("paper-4ms").profile), {"bus.nodes": 20, "bus.speed": "S400"}))
     'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'
     """
-    return sentence_text(_settings(network, changes))
-
-
-def _settings(network: Network, changes: NewValues) -> Sentence:
     # The number of nodes is the goal here, so the note on a second bus does not apply.
     meanings = {key: words for key, words in change_meanings(network.bus).items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings)
@@ -111,7 +104,7 @@ def _headline(plan: PlanAnswer) -> Sentence:
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
-    changes = _settings(plan.goal, option.changes)
+    changes = settings(plan.goal, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
 
@@ -125,7 +118,7 @@ def _freed(plan: PlanAnswer, before: str | None = None) -> str:
 def _relaxed(plan: PlanAnswer, relaxation: Relaxation) -> Sentence:
     """Say what would be enough, and what to set then."""
     label = next(freedom.label for freedom in freedoms(plan.goal) if freedom.name == relaxation.relaxed)
-    return Sentence((f"Enough would be to free the {label}: ", *_settings(plan.goal, relaxation.changes).parts, "."))
+    return Sentence((f"Enough would be to free the {label}: ", *settings(plan.goal, relaxation.changes).parts, "."))
 
 
 def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
@@ -184,7 +177,7 @@ def _row(option: Option) -> TableRow:
     cells: tuple[Cell, ...] = (
         option.title,
         "*" * option.recommended,
-        _short(option.network, option.changes),
+        settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
         option.network.bus.figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
         *_margin(option),
@@ -201,47 +194,3 @@ def _margin(option: Option) -> tuple[ShownValue, ShownValue]:
     beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
     is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures, option.network))
     return margin._replace(state="neutral" if is_enough else "fails"), doubt
-
-
-_SHORT: Final = {
-    "bus.nodes": "{} nodes",
-    "cycle.period_us": "{}",
-    "cycle.slice_ratio": "ratio {}",
-    "payload.read_bytes": "read {} bytes",
-    "payload.write_bytes": "write {} bytes",
-    "payload.read_bytes_per_axis": "read {} bytes an axis",
-    "payload.write_bytes_per_axis": "write {} bytes an axis",
-}
-
-
-_BOTH: Final = ("payload.read_bytes", "payload.write_bytes")
-
-
-def _short(network: Network, changes: NewValues) -> Cell:
-    """The settings of an option, in a few words."""
-    if not changes:
-        return MISSING
-    sizes = {key: value for key, value in changes.items() if key in _BOTH}
-    is_same = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
-    shown = {key: value for key, value in changes.items() if not is_same or key != _BOTH[-1]}
-    of_bus = {name: key.short for name, key in network.bus.keys.items() if key.short}
-    words = {**_SHORT, **of_bus, **({_BOTH[0]: "payload {} bytes"} if is_same else {})}
-    return joined(
-        *(
-            sentence(_counted(words[key], value), _short_value(key, value))
-            if key in words
-            else settings_sentence({key: value}, meanings={})
-            for key, value in shown.items()
-        ),
-        by=", ",
-    )
-
-
-def _counted(words: str, value: BusValue) -> str:
-    """The words of a value, of one byte or node in the singular."""
-    return words.replace(" bytes", " byte").replace(" nodes", " node") if value == 1 else words
-
-
-def _short_value(key: str, value: BusValue) -> ShownValue:
-    shown = ShownValue(value, key)
-    return shown._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else shown

@@ -522,9 +522,9 @@ class Cure(NamedTuple):
     """Reason that no change is enough."""
 
 
-def cure(network: Network, *, kept: Collection[str] = ()) -> Cure:
+def cure(network: Network) -> Cure:
     """Find the change that mends a network, with the default freedoms of a plan."""
-    steps = search(network, freed(network, kept=kept), kept=kept)
+    steps = search(network, freed(network))
     last = steps[-1]
     return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
 

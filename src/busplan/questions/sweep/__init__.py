@@ -82,9 +82,6 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     def __len__(self) -> int:
         return len(self.table)
 
-    def __contains__(self, name: object) -> bool:
-        return name in self.table
-
     # A mapping would compare its columns: arrays, which have no single truth.
     __eq__, __hash__ = object.__eq__, object.__hash__
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal, localcontext
-from difflib import get_close_matches
 from itertools import islice, product
 from math import isfinite, prod
 from typing import Any, Final, NamedTuple, TypeGuard
@@ -17,7 +16,7 @@ from busplan.english import listed
 from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.profile.edit import whole
-from busplan.profile.kinds import cycle_keys, named_tables, words_of
+from busplan.profile.kinds import cycle_keys, dotted_keys, words_of
 from busplan.questions.base.inputs import checked_model, items
 from busplan.questions.fit.network import changed, model_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
@@ -188,23 +187,14 @@ def grid_models(network: Network, grid: Grid, models: Sequence[str] | None) -> t
 
 def _require_known(profile: Profile, key: str, *, name: str) -> None:
     """Refuse a key that does not exist, or that is a section or a list."""
-    *tables, last = key.split(".")
-    table: Any = profile.model_dump()
-    for part in tables:
-        named = named_tables(table)
-        table = named.get(part) if named else table.get(part) if isinstance(table, dict) else None
-    if not isinstance(table, dict) or last not in table:
-        section = ".".join(tables)
-        siblings = list(table) if isinstance(table, dict) and tables else []
-        close = [f"{section}.{sibling}" for sibling in get_close_matches(last, siblings, n=1, cutoff=0.7)]
-        read = cycle_keys(profile)
-        close = close or get_close_matches(key, read, n=1, cutoff=0.8) * (not siblings)
-        advice = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
-        hint = f"did you mean {close[0]}?" if close else advice
-        raise BusplanError(f"{name}: no such key of this profile; {hint}")
-    if isinstance(table[last], dict | list | tuple):
-        what = "section" if isinstance(table[last], dict) else "list"
-        raise BusplanError(f"{name}: is a {what}; expected the key of one number")
+    keys = dotted_keys(profile)
+    if any(other.startswith(f"{key}.") for other in keys):
+        raise BusplanError(f"{name}: is a section; expected the key of one number")
+    if key not in keys:
+        override(profile, {key: 0}, origin={key: name})  # says what was meant
+        raise BusplanError(f"{name}: no such key of this profile")
+    if isinstance(keys[key].value, list | tuple):
+        raise BusplanError(f"{name}: is a list; expected the key of one number")
 
 
 def _samples(axis: Array) -> list[Value]:

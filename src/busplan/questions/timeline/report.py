@@ -6,7 +6,6 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
-from busplan.buses.limits import IDLE
 from busplan.elementwise import plain
 from busplan.english import nouns
 from busplan.forms.blocks import (
@@ -57,7 +56,7 @@ _MOST_EVENT_LANES: Final = 20
 _MOST_LANES: Final = 128
 """Most lanes of nodes; with more nodes, neighbours share a lane."""
 _MOST_BARS: Final = 400
-"""Most bars on a scale: beyond it, a bar is a whole transaction; if these are too many, a step of the scale."""
+"""Most events with a bar each; of more, each transaction has one."""
 _NEEDED: Final = Entry("long-gap", "needed", "#")
 _LEFT: Final = Entry("fits", "margin", ".")
 _BEYOND: Final = Entry("late", "beyond the slice", "!")
@@ -163,18 +162,7 @@ def _chart(schedule: Schedule, needs: Sequence[ModelNeeds], *, title: str) -> Ch
     words = _window_words(window)
     text = sentence_text(words)
     drawing = Drawing(title, (_period(schedule, needs), lanes), (text,), text, has_characters=True)
-    return Chart(drawing, joined(_longest_kind(window), words, by="; "), Sentence((legend,)) if legend else None)
-
-
-def _longest_kind(window: Schedule) -> Sentence:
-    """Say which kind of event takes most of the window."""
-    model = f"by the {window.figures.timing_model} model"
-    busy = [total for total in totals(window) if total.kind != IDLE.key]
-    if not busy:
-        return Sentence((f"Nothing but idle time {model}",))
-    most = max(busy, key=lambda total: total.total_us)
-    label = window.network.bus.event_kind(most.kind).label
-    return sentence(f"Mostly {label}, {{}} {model}", ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals))
+    return Chart(drawing, words, Sentence((legend,)) if legend else None)
 
 
 def _window_words(window: Schedule) -> Sentence:
@@ -196,8 +184,7 @@ def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
     figures, end_us = schedule.figures, schedule.end_us
     slice_us, period_us = figures.available_us, figures.period_us
     scale_us = max(period_us, end_us, *(model.required_us for model in needs))
-    spans, _ = _few_bars([list(_transactions(schedule, schedule.cycle_events))], 0.0, scale_us)
-    lanes = [Lane("cycle", (*spans[0], *_part(_REST, end_us, period_us)))]
+    lanes = [Lane("cycle", (*_transactions(schedule, schedule.cycle_events), *_part(_REST, end_us, period_us)))]
     for model in needs:
         parts = (
             *_part(_NEEDED, 0.0, min(model.required_us, slice_us)),
@@ -249,14 +236,12 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         draw = _events
         if len(events) > _MOST_BARS:
             draw, legend = _transactions, "A bar is a whole transaction."
-        spans, is_merged = _few_bars([list(draw(window, in_lane)) for in_lane in of_lane], window.from_us, window.to_us)
-        if is_merged:
-            legend = f"A bar is what takes most of a {_MOST_BARS}th of the scale."
         names = _names_of_nodes(window)
         ends = (list(dict.fromkeys((names[members[0] - 1], names[members[-1] - 1]))) for members in shared)
         labels = ["bus", *(" to ".join(pair).replace("node ", "nodes ", len(pair) - 1) for pair in ends)]
         labels = [label.replace(" to node ", " to ") for label in labels]
-        lanes = [Lane(label, bars) for label, bars in zip(labels, spans, strict=True) if bars]
+        drawn = ((label, tuple(draw(window, in_lane))) for label, in_lane in zip(labels, of_lane, strict=True))
+        lanes = [Lane(label, bars) for label, bars in drawn if bars]
     if _overruns(window) and window.to_us > window.figures.available_us:
         lanes.append(_over(window))
     plot = _plot(window, window.to_us, lanes, start_us=window.from_us, is_beside=not has_each)
@@ -318,35 +303,6 @@ def _transactions(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]
 def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: float) -> Span:
     look = schedule.network.bus.event_kind(kind)
     return Span(Entry(look.ink, look.label, look.mark), start_us, end_us, _tip(title, start_us, end_us))
-
-
-def _few_bars(lanes: Sequence[Sequence[Span]], start_us: float, end_us: float) -> tuple[list[tuple[Span, ...]], bool]:
-    """The bars of lanes on one scale; if they are too many, bars with their middles in the same step become one.
-
-    Returns
-    -------
-    tuple
-        The bars of each lane, and whether bars were merged.
-    """
-    step_us = (end_us - start_us) / _MOST_BARS
-    if sum(map(len, lanes)) <= _MOST_BARS or step_us <= 0:
-        return [tuple(bars) for bars in lanes], False
-
-    def step(bar: Span) -> int:
-        return int(((bar.start + bar.end) / 2 - start_us) / step_us)
-
-    return [tuple(_together(list(bars)) for _, bars in groupby(lane, step)) for lane in lanes], True
-
-
-def _together(bars: Sequence[Span]) -> Span:
-    """One bar for several adjacent ones, of the kind that takes most of their time."""
-    if len(bars) == 1:
-        return bars[0]
-    times_us: dict[Entry, float] = {}
-    for bar in bars:
-        times_us[bar.entry] = times_us.get(bar.entry, 0.0) + bar.end - bar.start
-    entry, start_us, end_us = max(times_us, key=lambda kind: times_us[kind]), bars[0].start, bars[-1].end
-    return Span(entry, start_us, end_us, _tip(f"{len(bars)} bars, mostly {entry.words}", start_us, end_us))
 
 
 def _title(event: Event) -> str:
