@@ -139,8 +139,6 @@ def _declared(command: Callable[..., None]) -> Callable[..., None]:
         info.help, info.show_default = " ".join(lines.split()).replace(" [default: ", "  [default: "), False
         if names.startswith("-"):
             info.param_decls, info.metavar = names.split(","), value or None
-        else:
-            info.metavar = names
         parameters[name] = parameters[name].replace(annotation=Annotated[kind, info])
     # Typer reads the signature, and the annotations beside it.
     command.__signature__ = written.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]
