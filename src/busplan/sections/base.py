@@ -1,9 +1,9 @@
 """Base of all sections of a profile: strictness, ranges, and errors in our own words."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from busplan.errors import ProblemKind
@@ -55,6 +55,18 @@ class Section(BaseModel):
         # Editors show it.
         model_title_generator=_title,
     )
+
+    def _problems(self) -> Iterator[Problem]:
+        """Tell where values that are right alone do not agree; a section that extends another adds its own."""
+        yield from ()
+
+    @model_validator(mode="after")
+    def _agrees_with_itself(self) -> Self:
+        # A class may rely on what those that it extends have checked.
+        for section in reversed(type(self).__mro__):
+            if "_problems" in vars(section) and (problems := tuple(vars(section)["_problems"](self))):
+                raise refused(*problems)
+        return self
 
 
 class Extended(Section):

@@ -4,11 +4,12 @@ A kind of bus adds its own keys in a class of its own. The limits of its standar
 breaks them loads, and the analysis says why it does not fit.
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from busplan.elementwise import Number, choose, interpolated
 from busplan.english import plural
@@ -24,7 +25,6 @@ from busplan.sections.base import (
     Section,
     TimeUs,
     TransactionKind,
-    refused,
 )
 from busplan.sourced import Sourced
 
@@ -119,23 +119,14 @@ class TableExecution(GradedExecution):
         description="Execution time T_exec of each [us]", examples=[[36.7, 36.3]]
     )
 
-    @model_validator(mode="after")
-    def _is_a_table(self) -> Self:
-        problems = [
-            Problem(
-                f"payloads must ascend, and this follows {before}",
-                key=f"payload_bytes.{index}",
-                kind="inconsistent",
-            )
-            for index, (before, after) in enumerate(pairwise(self.payload_bytes), start=1)
-            if before >= after
-        ]
+    def _problems(self) -> Iterator[Problem]:
+        for index, (before, after) in enumerate(pairwise(self.payload_bytes), start=1):
+            if before >= after:
+                why = f"payloads must ascend, and this follows {before}"
+                yield Problem(why, key=f"payload_bytes.{index}", kind="inconsistent")
         if len(self.payload_bytes) != len(self.time_us):
             values = f"has {plural(len(self.time_us), 'value')} and payload_bytes has {len(self.payload_bytes)}"
-            problems.append(Problem(f"{values}: the two must be of one length", key="time_us", kind="inconsistent"))
-        if problems:
-            raise refused(*problems)
-        return self
+            yield Problem(f"{values}: the two must be of one length", key="time_us", kind="inconsistent")
 
     @property
     def ascends_from_bytes(self) -> int:
@@ -221,20 +212,11 @@ class PayloadSection(Extended):
         default=None, description="What each axis of a node adds to the write payload [bytes]", examples=[8]
     )
 
-    @model_validator(mode="after")
-    def _is_given(self) -> Self:
-        missing = [
-            Problem(
-                f"missing key; expected {kind}_bytes, {kind}_bytes_per_axis or both",
-                key=f"{kind}_bytes",
-                kind="missing-key",
-            )
-            for kind in TRANSACTION_KINDS
-            if self._parts(kind) == (None, None)
-        ]
-        if missing:
-            raise refused(*missing)
-        return self
+    def _problems(self) -> Iterator[Problem]:
+        for kind in TRANSACTION_KINDS:
+            if self._parts(kind) == (None, None):
+                why = f"missing key; expected {kind}_bytes, {kind}_bytes_per_axis or both"
+                yield Problem(why, key=f"{kind}_bytes", kind="missing-key")
 
     def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
         return getattr(self, f"{kind}_bytes"), getattr(self, f"{kind}_bytes_per_axis")
@@ -290,20 +272,14 @@ class GroupSection(NodeSection, PayloadSection):
     nodes: Count = Field(description="Nodes of the group", examples=[2])
     axes: GroupAxes = Field(examples=[4])
 
-    @model_validator(mode="after")
-    def _has_payloads(self) -> Self:
-        empty = [
-            Problem(
-                f"makes a payload of 0 bytes: the group has no axes; give {kind}_bytes",
-                key=self.key_of(kind),
-                kind="inconsistent",
-            )
-            for kind in TRANSACTION_KINDS
-            if not self.bytes_of(kind, axes=self.axes)
-        ]
-        if empty:
-            raise refused(*empty)
-        return self
+    may_be_empty: ClassVar[bool] = False
+    """Whether its payloads may have 0 bytes."""
+
+    def _problems(self) -> Iterator[Problem]:
+        for kind in TRANSACTION_KINDS:
+            if not (self.may_be_empty or self.bytes_of(kind, axes=self.axes)):
+                why = f"makes a payload of 0 bytes: the group has no axes; give {kind}_bytes"
+                yield Problem(why, key=self.key_of(kind), kind="inconsistent")
 
 
 SpareCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]

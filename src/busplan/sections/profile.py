@@ -5,9 +5,9 @@ for a float.
 """
 
 from collections.abc import Callable, Collection, Iterator
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from busplan.english import has_controls
 from busplan.sections.base import MISSING, TRANSACTION_KINDS, Problem, Section, refused
@@ -117,8 +117,7 @@ class Profile(Section):
             elif "group" not in given and key not in given:
                 yield Problem(MISSING, key=key, kind="missing-key")
 
-    @model_validator(mode="after")
-    def _nodes_are_given_once(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         present = {name for name in self.model_fields_set if getattr(self, name) not in (None, ())}
         problems = list(self.nodes_problems(present | ({"bus.nodes"} if self.bus.nodes is not None else set())))
         names = [group.name for group in self.group]
@@ -127,27 +126,17 @@ class Profile(Section):
             for place, name in enumerate(names)
             if name in names[:place]
         )
-        if problems:
-            raise refused(*problems)
-        return self
+        yield from problems or self._unknown_executions()
 
-    @model_validator(mode="after")
-    def _execution_is_known(self) -> Self:
-        unknown = [
-            Problem(
-                f"{sum_}is outside the execution table, {execution.range_bytes}: measure it and add it to "
-                f'{nodes.node_key("execution")}, or use kind = "linear"',
-                key=key,
-                kind="execution-unknown",
-            )
-            for place, nodes in enumerate(self.node_groups)
-            if isinstance(execution := nodes.node.execution, TableExecution)
-            for key, size, sum_ in _payloads(nodes, place)
-            if not execution.covers(size)
-        ]
-        if unknown:
-            raise refused(*unknown)
-        return self
+    def _unknown_executions(self) -> Iterator[Problem]:
+        for place, nodes in enumerate(self.node_groups):
+            if not isinstance(execution := nodes.node.execution, TableExecution):
+                continue
+            right = f'measure it and add it to {nodes.node_key("execution")}, or use kind = "linear"'
+            for key, size, sum_ in _payloads(nodes, place):
+                if not execution.covers(size):
+                    why = f"{sum_}is outside the execution table, {execution.range_bytes}: {right}"
+                    yield Problem(why, key=key, kind="execution-unknown")
 
 
 def _payloads(nodes: ProfileGroup, place: int) -> Iterator[tuple[str, int, str]]:

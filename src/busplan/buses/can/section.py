@@ -1,9 +1,9 @@
 """The keys that only profiles of a CAN bus have, in [bus], [payload], [[group]], [[message]] and [limits]."""
 
 from collections.abc import Collection, Iterator
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from busplan.buses.can.cycle import WORST, TimingModelName
 from busplan.buses.can.equations import (
@@ -34,7 +34,6 @@ from busplan.sections.base import (
     Section,
     TimeUs,
     TransactionKind,
-    refused,
 )
 from busplan.sections.cycle import (
     UNKNOWN_SHARE,
@@ -140,15 +139,13 @@ class CanBus(BusSection):
         examples=[WORST],
     )
 
-    @model_validator(mode="after")
-    def _agrees_with_itself(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         if self.data_bit_rate_kbit_s is not None and self.data_bit_rate_kbit_s < self.bit_rate_kbit_s:
             why = f"is under bit_rate_kbit_s, {self.bit_rate_kbit_s:g}: CAN FD switches to no slower bit rate"
-            raise refused(Problem(why, key="data_bit_rate_kbit_s", kind="inconsistent"))
+            yield Problem(why, key="data_bit_rate_kbit_s", kind="inconsistent")
         if self.error_period_us is None and self.error_burst is not None:
             why = "asks for error_period_us, the time from one burst of errors to the next"
-            raise refused(Problem(why, key="error_burst", kind="inconsistent"))
-        return self
+            yield Problem(why, key="error_burst", kind="inconsistent")
 
     @property
     def host_doubt_us(self) -> Number:
@@ -266,17 +263,15 @@ class CanMessage(Section):
         examples=[5000],
     )
 
-    @model_validator(mode="after")
-    def _is_one_frame(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         if self.per_node and self.sender is not None:
-            raise refused(Problem("has each node for its sender", key="sender", kind="inconsistent"))
+            yield Problem("has each node for its sender", key="sender", kind="inconsistent")
         if self.payload_bytes > FRAME_BYTES and not self.fd:
             why = f"is over the {FRAME_BYTES:g} bytes of a classical frame; fd = true allows {FD_FRAME_BYTES:g}"
-            raise refused(Problem(why, key="payload_bytes"))
+            yield Problem(why, key="payload_bytes")
         if not (self.brs or self.fd):
             why = "is of an FD frame that keeps the bit rate, and a classical frame has one alone; write fd = true"
-            raise refused(Problem(why, key="brs", kind="inconsistent"))
-        return self
+            yield Problem(why, key="brs", kind="inconsistent")
 
 
 class CanLimits(Limits):
@@ -348,18 +343,15 @@ class CanProfile(Profile):
         if "cycle" not in given:
             yield Problem(MISSING, key="cycle", kind="missing-key")
 
-    @model_validator(mode="after")
-    def _agrees_with_itself(self) -> Self:
-        problems = (
-            *(() if self.has_cycle else self._problems_of_no_cycle()),
-            *(() if self.bus.access == "sync" else self._problems_of_no_sync()),
-            *self._names_problems(),
-            *self._identifiers_problems(),
-            *(() if self.bus.data_bit_rate_kbit_s is not None else self._problems_of_no_data_bit_rate()),
-        )
-        if problems:
-            raise refused(*problems)
-        return self
+    def _problems(self) -> Iterator[Problem]:
+        if not self.has_cycle:
+            yield from self._problems_of_no_cycle()
+        if self.bus.access != "sync":
+            yield from self._problems_of_no_sync()
+        yield from self._names_problems()
+        yield from self._identifiers_problems()
+        if self.bus.data_bit_rate_kbit_s is None:
+            yield from self._problems_of_no_data_bit_rate()
 
     def _problems_of_no_cycle(self) -> Iterator[Problem]:
         """Keys of a cycle, of a network without nodes."""

@@ -1,8 +1,9 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
-from typing import Annotated, Any, Final, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
 from busplan.buses.ethercat.equations import (
@@ -182,10 +183,8 @@ class EthercatGroup(EthercatNode, GroupSection):
             raise refused(Problem(MISSING, kind="missing-key"))
         return value
 
-    @model_validator(mode="after")
-    def _has_payloads(self) -> Self:
-        """Replaces the check of the parent: couplers have no data, and most terminals only inputs or only outputs."""
-        return self
+    # Couplers have no data, and most terminals only inputs or only outputs.
+    may_be_empty: ClassVar[bool] = True
 
 
 class EthercatProfile(Profile):
@@ -198,14 +197,12 @@ class EthercatProfile(Profile):
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
 
-    @model_validator(mode="after")
-    def _rates_meet(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         try:
             checked_hyperperiod([group.every for group in self.group])
         except BusplanError as error:
             slowest = max(range(len(self.group)), key=lambda index: self.group[index].every)
-            raise refused(Problem(str(error), key=f"group.{slowest}.every", kind="inconsistent")) from None
-        return self
+            yield Problem(str(error), key=f"group.{slowest}.every", kind="inconsistent")
 
 
 PROFILE: Final = EthercatProfile

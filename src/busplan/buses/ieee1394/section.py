@@ -1,8 +1,9 @@
 """The keys that only profiles of an IEEE 1394 bus have, in [bus], [cycle] and [payload]."""
 
-from typing import Annotated, Final, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
 
 from busplan.buses.ieee1394.constants import (
     ARBITRATION_HOLD_US,
@@ -103,22 +104,16 @@ class Ieee1394Bus(BusSection):
         examples=[0.144],
     )
 
-    @model_validator(mode="after")
-    def _table_holds_for_the_cable(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         if self.gap_count == "optimal" and not self.cable_is_standard:
             message = (
                 f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
                 f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number"
             )
-            raise refused(Problem(message, "gap_count", "inconsistent"))
-        return self
-
-    @model_validator(mode="after")
-    def _isochronous_needs_a_master(self) -> Self:
+            yield Problem(message, "gap_count", "inconsistent")
         if self.isochronous_us and not self.cycle_master:
             message = "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true"
-            raise refused(Problem(message, "isochronous_us", "inconsistent"))
-        return self
+            yield Problem(message, "isochronous_us", "inconsistent")
 
     @property
     def cable_is_standard(self) -> bool:
@@ -268,26 +263,21 @@ class Ieee1394Profile(Profile):
     cycle: Ieee1394CycleSection = Field(description="The communication cycle")
     payload: Ieee1394Payload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
 
-    @model_validator(mode="after")
-    def _hops_fit_the_wiring(self) -> Self:
+    def _problems(self) -> Iterator[Problem]:
         most, is_charged = self.bus.max_hops, self.bus.charge_hops == "own"
-        problems: list[Problem] = []
         for place, group in enumerate(self.group):
             key = f"group.{place}.hops"
             if group.hops is None and most is not None and is_charged:
                 message = 'missing key: bus.charge_hops = "own" needs the hops of each group of a tree'
-                problems.append(Problem(message, key, "missing-key"))
+                yield Problem(message, key, "missing-key")
             if group.hops is not None and most is None:
                 message = "the order of the groups says it in a chain; set bus.max_hops for a tree"
-                problems.append(Problem(message, key, "inconsistent"))
+                yield Problem(message, key, "inconsistent")
             if group.hops is not None and most is not None and group.hops > most:
-                problems.append(Problem(f"is over the {most} hops of bus.max_hops", key, "inconsistent"))
+                yield Problem(f"is over the {most} hops of bus.max_hops", key, "inconsistent")
         if most is not None and is_charged and not self.group:
             message = "needs the hops of each node of a tree: describe them as groups, [[group]] with hops"
-            problems.append(Problem(message, "bus.charge_hops", "inconsistent"))
-        if problems:
-            raise refused(*problems)
-        return self
+            yield Problem(message, "bus.charge_hops", "inconsistent")
 
 
 PROFILE: Final = Ieee1394Profile

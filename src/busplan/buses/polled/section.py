@@ -1,12 +1,13 @@
 """The keys that only profiles of polled buses have, in [bus]."""
 
-from typing import Annotated, Final, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Final, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from busplan.buses.polled.cycle import STANDARD, TimingModelName
 from busplan.buses.polled.protocols import BitTimes, Protocol, ProtocolName, Requests, protocol_of
-from busplan.sections.base import Count, Problem, TimeUs, refused
+from busplan.sections.base import Count, Problem, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
 
@@ -78,23 +79,19 @@ class PolledBus(BusSection):
         examples=[STANDARD],
     )
 
-    @model_validator(mode="after")
-    def _is_of_its_protocol(self) -> Self:
-        protocol, problems = protocol_of(self), []
+    def _problems(self) -> Iterator[Problem]:
+        protocol = protocol_of(self)
         ways = protocol.requests
         if not ways:
-            problems.append(Problem("has no request that reads a node; give read_request_bytes", "protocol"))
+            yield Problem("has no request that reads a node; give read_request_bytes", "protocol")
         elif self.requests is not None and self.requests not in ways:
-            problems.append(Problem(f"the protocol has none of these; it has {', '.join(ways)}", "requests"))
+            yield Problem(f"the protocol has none of these; it has {', '.join(ways)}", "requests")
         if self.global_control and not protocol.global_bytes:
-            problems.append(Problem("the protocol has no broadcast that opens a cycle", "global_control"))
+            yield Problem("the protocol has no broadcast that opens a cycle", "global_control")
         if self.retries and self.timeout_us is None and self.protocol != "profibus-dp":
-            problems.append(Problem("a repeated request waits for a timeout; give bus.timeout_us", "retries"))
+            yield Problem("a repeated request waits for a timeout; give bus.timeout_us", "retries")
         if self.return_delay_us is not None and self.protocol == "profibus-dp":
-            problems.append(Problem("PROFIBUS has no return delay; give max_turn_bits", "return_delay_us"))
-        if problems:
-            raise refused(*problems)
-        return self
+            yield Problem("PROFIBUS has no return delay; give max_turn_bits", "return_delay_us")
 
 
 class PolledProfile(Profile):
