@@ -80,6 +80,8 @@ class Bus(ABC):
     """Recordings that it compares with a plan, for messages; empty if it reads none."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """Changes that each take a term out of the cycle: new values by dotted key."""
+    modules: ClassVar[tuple[str, ...]] = ()
+    """Modules beside its own that a single command imports: `evidence` with `FUNCTIONS`, `emulated` with `EMULATOR`."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
 
@@ -125,9 +127,11 @@ class Bus(ABC):
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads that a plan may choose from."""
 
-    def setpoints_every(self, network: Network) -> tuple[str, int]:  # noqa: ARG002 - a kind may have a single rate
-        """Cycles between set-points of the fastest axes: the key that sets them, and their number."""
-        return "", 1
+    def setpoints_every(self, network: Network) -> tuple[str, int]:
+        """Cycles between set-points of the fastest group with axes: the key that sets them, and their number."""
+        with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
+        fastest = min(with_axes, key=lambda group: plain(group.every))
+        return fastest.payload_key("every"), int(plain(fastest.every))
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
         """Say how large a network is, in plain numbers: each number with its noun."""
@@ -147,7 +151,7 @@ class Bus(ABC):
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions by the name that a row of evidence has; each takes a cycle and the values of the row."""
-        return {}
+        return self._of("evidence", "FUNCTIONS") or {}
 
     def title_of(self, network: Network) -> str:  # noqa: ARG002 - of every network the same, unless a kind has several
         """Name of the bus of a network, for people."""
@@ -186,8 +190,14 @@ class Bus(ABC):
         raise BusplanError(f"{path}: no recording of bus.kind {self.kind} is read{latencies}")
 
     def emulator(self) -> Emulator | None:
-        """What it emulates, imported only here; None if it writes no recordings."""
-        return None
+        """What it emulates; None if it writes no recordings."""
+        emulator: Emulator | None = self._of("emulated", "EMULATOR")
+        return emulator
+
+    def _of(self, module: str, name: str) -> Any:
+        """What a module beside its own has by a name, imported only here; None where it has no such module."""
+        package = type(self).__module__.removesuffix("kind")
+        return getattr(import_module(f"{package}{module}"), name) if module in self.modules else None
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""

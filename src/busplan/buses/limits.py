@@ -94,7 +94,7 @@ class Limit(NamedTuple):
     value: Callable[[Network], Number]
     most: Callable[[Network], Number]
     doubt: Callable[[Network], Number] | None = None
-    """Standard uncertainty of value - bound; None if both are exact."""
+    """Standard uncertainty of value - bound, both times; None if both are exact."""
     perhaps: Callable[[Network], Number] | None = None
     """Part of the value that is only possible: it can keep the limit from being shown to be kept, but not break it."""
     period: "Callable[[Limit, Network], Number] | None" = None
@@ -119,7 +119,7 @@ class Limit(NamedTuple):
     @property
     def shown(self) -> "Limit":
         """The limit on value + U: a network that keeps it is shown to keep this one."""
-        if self.doubt is None:
+        if self.doubt is None and self.perhaps is None:
             return self
         return self.nominal._replace(value=lambda network: self.value(network) + self.uncertainty(network))
 
@@ -139,7 +139,7 @@ class Limit(NamedTuple):
     def verdict_code(self, network: Network) -> Number:
         """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
         surely = choose(self.is_broken(network), BROKEN, KEPT)
-        if self.doubt is None:
+        if self.doubt is None and self.perhaps is None:
             return surely
         return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
 
@@ -250,8 +250,6 @@ class Setting(NamedTuple):
     """Dotted keys that it changes."""
     values: tuple[Mapping[str, Value], ...]
     """Other values that this network could have, as new values by key: safe ones first, then the smallest change."""
-    reason: str = ""
-    """Why there are no values, if there are none."""
 
 
 class Perturbation(NamedTuple):
@@ -387,6 +385,24 @@ def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
     periods, period_us = subject.network.bus.periods, subject.profile.cycle.period_us
     if not periods.allows(period_us):
         yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
+
+
+def nodes_limit(nodes: str, most: float, bus: str, *, of: str = "of a", has_rule: bool = False) -> Limit:
+    """The limit on the nodes of a bus.
+
+    Parameters
+    ----------
+    nodes, bus
+        What they are called.
+    most
+        The most nodes of a bus [1].
+    of
+        Words between the number and the bus.
+    has_rule
+        As `Limit` has it.
+    """
+    over, way_out = f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}", f"a second {bus} has {most:g} more"
+    return Limit("nodes", over, lambda network: network.nodes, lambda _: most, way_out=way_out, has_rule=has_rule)
 
 
 NODE: Final = "node"

@@ -98,6 +98,10 @@ class Group(NamedTuple):
         """Dotted key in the profile for a key of [node], such as "execution.worst_extra_us"."""
         return self.members[0].node_key(name)
 
+    def payload_key(self, name: str) -> str:
+        """Dotted key in the profile for a key of [payload], such as "every"."""
+        return f"group.{self.members[0].name}.{name}" if self.members[0].name else f"payload.{name}"
+
 
 class Network(NamedTuple):
     """Inputs of the cycle of a profile. The numbers may be of any sort: floats, arrays, traced numbers."""

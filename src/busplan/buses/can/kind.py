@@ -1,7 +1,7 @@
 """CAN, as a kind of bus."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
@@ -18,7 +18,6 @@ from busplan.buses.can.equations import (
 )
 from busplan.buses.can.frames import streams, traffic_of
 from busplan.buses.can.rules import LIMITS, RULES
-from busplan.buses.emulation import Emulator
 from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
@@ -41,40 +40,24 @@ def _pdo_per(network: Network) -> Setting:
         for nodes in network.profile.node_groups
         if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
     }
-    reason = "" if several else "each axis has one already"
     values = (several,) if several else ()
-    return Setting("pdo_per", "PDOs of each axis", Cost.REGISTER, tuple(keys.values()), values, reason)
+    return Setting("pdo_per", "PDOs of each axis", Cost.REGISTER, tuple(keys.values()), values)
 
 
 def _higher(name: str, rate_kbit_s: float, rates_kbit_s: Sequence[float]) -> Setting:
     """Higher bit rates, the next higher first: cable, and for the data of CAN FD transceivers, must carry them."""
     key = f"bus.{name}_kbit_s"
     higher = tuple({key: rate} for rate in rates_kbit_s if rate > rate_kbit_s)
-    reason = "" if higher else "it is the highest"
-    return Setting(name, name.replace("_", " "), Cost.SCHEDULE, (key,), higher, reason)
-
-
-def _at_once(access: str) -> Setting:
-    """All commands at once, where nodes are asked one by one."""
-    values = ({"bus.access": "burst"},) if access == "polled" else ()
-    return Setting(
-        "access", "way to ask", Cost.SCHEDULE, ("bus.access",), values, "" if values else "all at once already"
-    )
+    return Setting(name, name.replace("_", " "), Cost.SCHEDULE, (key,), higher)
 
 
 def _identifier_bits(network: Network) -> Setting:
     """Identifiers of 11 bits, where all are small enough."""
     key, traffic = "bus.identifier_bits", traffic_of(network)
     last = [stream.last for stream in streams(traffic) if stream.identifier_bits == traffic.identifier_bits]
-    reason = ""
-    if plain(traffic.identifier_bits) == BASE_BITS:
-        reason = f"they have {BASE_BITS} bits"
-    elif not last:
-        reason = "no message has the length of the bus"
-    elif max(last) > MAX_IDENTIFIER[BASE_BITS]:
-        reason = f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}"
-    values = () if reason else ({key: BASE_BITS},)
-    return Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), values, reason)
+    is_larger = plain(traffic.identifier_bits) != BASE_BITS
+    values = ({key: BASE_BITS},) if is_larger and last and max(last) <= MAX_IDENTIFIER[BASE_BITS] else ()
+    return Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), values)
 
 
 _NO_SYNC: Final = 'bus.access = "{}" has none'
@@ -163,6 +146,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "message.identifier": Key("id"),
     }
     term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
+    modules = ("evidence", "emulated")
     recordings = "a log of candump, ASC, BLF or TRC, or a capture of SocketCAN,"
     evidence_data = ("can", "paper")
 
@@ -187,12 +171,14 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         bus = network.profile.bus
         rate, data_rate = bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s
         most = BIT_RATES[-1] if data_rate is None else data_rate
+        at_once = ({"bus.access": "burst"},) if bus.access == "polled" else ()
+        access = Setting("access", "way to ask", Cost.SCHEDULE, ("bus.access",), at_once)
         return (
             *((_pdo_per(network),) if any(nodes.node.axes > 1 for nodes in network.profile.node_groups) else ()),
             _higher("bit_rate", rate, [higher for higher in BIT_RATES if higher <= most]),
             *(() if data_rate is None else (_higher("data_bit_rate", data_rate, DATA_BIT_RATES),)),
             _identifier_bits(network),
-            *(() if bus.access == "sync" else (_at_once(bus.access),)),
+            *(() if bus.access == "sync" else (access,)),
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
@@ -214,12 +200,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         axes = (int(plain(group.axes)) for group in network.groups if group.payload.pdo_per == "axis")
         return PayloadRange(1, most_bytes * max(min(axes, default=1), 1), carrier="four frames")
 
-    def setpoints_every(self, network: Network) -> tuple[str, int]:
-        """Cycles between set-points of the fastest group."""
-        groups = [group for group in network.groups if plain(group.axes)] or network.groups
-        fastest = min(groups, key=lambda group: plain(group.every)).members[0]
-        return f"group.{fastest.name}.every" if fastest.name else "payload.every", int(plain(fastest.payload.every))
-
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
         """Nodes and axes; of a network without them its messages."""
         return super().counted(network) if network.groups else ((len(network.profile.message), "message"),)
@@ -235,12 +215,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         )
         access = {"polled": ("motors asked one by one",), "burst": ("all commands at once",)}.get(bus.access, ())
         return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *access, *seldom)
-
-    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Functions of `busplan.buses.can.evidence`."""
-        from busplan.buses.can.evidence import FUNCTIONS  # a single command asks for them
-
-        return FUNCTIONS
 
     def title_of(self, network: Network) -> str:
         """CAN, or CAN FD where it has a data bit rate."""
@@ -258,12 +232,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
             )
 
         return recorded(network, path, share=share, channel=channel, progress=progress)
-
-    def emulator(self) -> Emulator:
-        """Logs of candump."""
-        from busplan.buses.can.emulated import EMULATOR  # as above
-
-        return EMULATOR
 
 
 BUS: Final = Can()

@@ -1,12 +1,11 @@
 """EtherCAT, as a kind of bus, with its limits and rules."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import reduce
 from math import ceil, inf
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.emulation import Emulator
 from busplan.buses.ethercat.cycle import (
     EVENTS,
     LAST_BYTE,
@@ -39,6 +38,7 @@ from busplan.buses.limits import (
     Setting,
     Starter,
     TimingModel,
+    nodes_limit,
     share_of_period,
 )
 from busplan.buses.network import Group, Network
@@ -125,7 +125,6 @@ SYNC_WINDOW: Final = Limit(
     _window_words,
     _beyond_window_us,
     lambda _network: 0,
-    doubt=lambda _network: 0.0,
     perhaps=_unknown_jitter_us,
     way_out="measure bus.master_jitter_us, or make it smaller",
     place="bus.master_jitter_us",
@@ -133,13 +132,7 @@ SYNC_WINDOW: Final = Limit(
 """A frame must not move farther against SYNC0 than each drive allows."""
 LIMITS: Final = (
     NODE_LIMIT,
-    Limit(
-        "nodes",
-        "{value:.0f} devices are over the {most:.0f} addresses of a segment",
-        lambda network: network.nodes,
-        lambda _network: MOST_DEVICES,
-        way_out=f"a second segment has {MOST_DEVICES:g} more",
-    ),
+    nodes_limit("devices", MOST_DEVICES, "segment", of="addresses of a"),
     Limit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
@@ -258,6 +251,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         {"bus.master_jitter_us": 0.0},
         {"bus.mailbox_polls": 0},
     )
+    modules = ("evidence", "emulated")
     recordings = "a capture of the master's port, pcap or pcapng,"
     evidence_data = ("ethercat",)
 
@@ -306,12 +300,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
             ),
         )
 
-    def setpoints_every(self, network: Network) -> tuple[str, int]:
-        """Cycles between set-points of the fastest group with axes, and the key that sets them."""
-        with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
-        fastest = min(with_axes, key=lambda group: plain(group.every))
-        return fastest.key("every"), int(plain(fastest.every))
-
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes, up to what a frame holds."""
         each = 1 if layout(network) == SHARED else 2
@@ -323,12 +311,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
         return (layout(network), f"{plural(count, 'frame')}", *clocks)
 
-    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Functions of `busplan.buses.ethercat.evidence`."""
-        from busplan.buses.ethercat.evidence import FUNCTIONS  # a single command asks for them
-
-        return FUNCTIONS
-
     def recorded(
         self, network: Network, path: "Path", *, share: float, channel: str | None, progress: Progress
     ) -> Recorded:
@@ -338,12 +320,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         from busplan.buses.ethercat.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, progress=progress)
-
-    def emulator(self) -> Emulator:
-        """Captures of the master's port."""
-        from busplan.buses.ethercat.emulated import EMULATOR  # as above
-
-        return EMULATOR
 
 
 BUS = Ethercat()

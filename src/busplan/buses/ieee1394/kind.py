@@ -1,7 +1,7 @@
 """IEEE 1394 (FireWire), as a kind of bus."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Final
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
@@ -102,10 +102,9 @@ def _gap_count(network: Network) -> Setting:
     """The smallest safe gap count."""
     key = "bus.gap_count"
     empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
-    if not has_gaps(network):
-        return empty._replace(reason=f"{network.profile.bus.speed} has no gaps")
-    if not network.profile.bus.cable_is_standard:
-        return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
+    # From S800 on there are no gaps, and the table holds for some cables alone.
+    if not (has_gaps(network) and network.profile.bus.cable_is_standard):
+        return empty
     safe = plain(safe_gap_count_of(network))
     return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
 
@@ -114,14 +113,13 @@ def _responses(network: Network) -> Setting:
     """Answers without a second arbitration: of reads, of writes, of both."""
     keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
     if is_broadcast(network):
-        return Setting("responses", "responses", Cost.RESPONSES, keys, (), "no node answers a broadcast")
+        return Setting("responses", "responses", Cost.RESPONSES, keys, ())
     of_reads, of_writes = (
         {group.key(name): answer for group in network.groups if getattr(group.node, name) == "split"}
         for name, answer in _UNSPLIT.items()
     )
     both = {**of_reads, **of_writes} if of_reads and of_writes else {}
-    values = tuple(filter(None, (of_reads, of_writes, both)))
-    return Setting("responses", "responses", Cost.RESPONSES, keys, values, "" if values else "no node answers split")
+    return Setting("responses", "responses", Cost.RESPONSES, keys, tuple(filter(None, (of_reads, of_writes, both))))
 
 
 class Ieee1394(Bus):
@@ -175,6 +173,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         {"host.transaction_us": 0.0},
         {"cycle.retries": 0},
     )
+    modules = ("evidence",)
     evidence_data = ("paper", "dvrk", "ieee1394")
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
@@ -272,12 +271,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
                 "gap-count table holds for"
             )
         return warnings
-
-    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Functions of `busplan.buses.ieee1394.evidence`."""
-        from busplan.buses.ieee1394.evidence import FUNCTIONS  # a single command asks for them
-
-        return FUNCTIONS
 
 
 BUS: Final = Ieee1394()

@@ -23,7 +23,7 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
-from busplan.buses.limits import Limit
+from busplan.buses.limits import Limit, nodes_limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules, told_apart
 from busplan.elementwise import Number, plain
@@ -73,14 +73,7 @@ LIMITS: Final = (
         way_out="a faster bus or a smaller payload would do",
         has_rule=True,
     ),
-    Limit(
-        "nodes",
-        "{value:.0f} nodes are over the {most:.0f} of one bus",
-        lambda network: network.nodes,
-        lambda _network: MAX_NODES,
-        way_out=f"a second bus has {MAX_NODES:g} more",
-        has_rule=True,
-    ),
+    nodes_limit("nodes", MAX_NODES, "bus", of="of one", has_rule=True),
     Limit(
         "hops",
         "{value:.0f} hops are over the {most:.0f} of one bus",
@@ -122,7 +115,6 @@ LIMITS: Final = (
         "the arbitration of {bus.speed} has no published time, so the cycle is a lower bound",
         _without_gaps,
         lambda _network: 0,
-        doubt=lambda _network: 0.0,
         perhaps=_without_gaps,
         way_out="up to S400 all of it is known",
     ),

@@ -169,35 +169,13 @@ class Polled(Bus):
         rates = _RATES_KBIT_S.get(bus.protocol, ()) if isinstance(bus.protocol, str) else ()
         delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
         way = PolledCycle(network, STANDARD).way
-        parts: tuple[tuple[str, str, Cost, str, tuple[int | float | str, ...], str], ...] = (
-            (
-                "return_delay",
-                "return delay",
-                Cost.REGISTER,
-                "bus.return_delay_us",
-                (0.0,) if delay_us else (),
-                "it is 0",
-            ),
-            (
-                "bit_rate",
-                "bit rate",
-                Cost.REGISTER,
-                "bus.bit_rate_kbit_s",
-                tuple(float(rate) for rate in rates if rate > bus.bit_rate_kbit_s),
-                "no higher one is usual",
-            ),
-            (
-                "requests",
-                "way to ask",
-                Cost.SCHEDULE,
-                "bus.requests",
-                protocol.requests[: protocol.requests.index(way)][::-1],
-                "the protocol has no faster one",
-            ),
-        )
-        return tuple(
-            Setting(name, label, cost, (key,), tuple({key: value} for value in values), "" if values else reason)
-            for name, label, cost, key, values, reason in parts
+        no_delay = ({"bus.return_delay_us": 0.0},) if delay_us else ()
+        higher = tuple({"bus.bit_rate_kbit_s": float(rate)} for rate in rates if rate > bus.bit_rate_kbit_s)
+        faster = tuple({"bus.requests": other} for other in protocol.requests[: protocol.requests.index(way)][::-1])
+        return (
+            Setting("return_delay", "return delay", Cost.REGISTER, ("bus.return_delay_us",), no_delay),
+            Setting("bit_rate", "bit rate", Cost.REGISTER, ("bus.bit_rate_kbit_s",), higher),
+            Setting("requests", "way to ask", Cost.SCHEDULE, ("bus.requests",), faster),
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:

@@ -10,6 +10,7 @@ from busplan.buses.limits import (
     PayloadRange,
     Perturbation,
     TimingModel,
+    nodes_limit,
     period_limit,
 )
 from busplan.buses.network import Network
@@ -35,13 +36,7 @@ _FASTEST: Final = 16
 LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
-    Limit(
-        "nodes",
-        "{value:.0f} drives are over the {most:.0f} of a ring",
-        lambda network: network.nodes,
-        lambda _network: MOST_DRIVES,
-        way_out=f"a second ring has {MOST_DRIVES:g} more",
-    ),
+    nodes_limit("drives", MOST_DRIVES, "ring"),
     Limit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",

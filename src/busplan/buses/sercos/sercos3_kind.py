@@ -13,6 +13,7 @@ from busplan.buses.limits import (
     Perturbation,
     Setting,
     TimingModel,
+    nodes_limit,
     period_limit,
 )
 from busplan.buses.network import Network
@@ -53,13 +54,7 @@ def _largest_telegram(network: Network) -> Number:
 LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
-    Limit(
-        "nodes",
-        "{value:.0f} devices are over the {most:.0f} of a network",
-        lambda network: network.nodes,
-        lambda _network: MOST_DEVICES,
-        way_out=f"a second network has {MOST_DEVICES:g} more",
-    ),
+    nodes_limit("devices", MOST_DEVICES, "network"),
     Limit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
