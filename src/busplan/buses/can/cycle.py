@@ -100,21 +100,14 @@ class CanCycle(BusCycle):
     command_events = (("command", "command_frame"),)
 
     def __init__(
-        self,
-        network: Network,
-        model: str,
-        number: int | None = None,
-        *,
-        repeated: int | None = None,
-        is_longest: bool = False,
+        self, network: Network, model: str, number: int | None = None, *, traffic: Traffic | None = None
     ) -> None:
         self.network = network
         self.model = model
         self.number = number
-        self.is_longest = is_longest
-        """Whether FD frames take the most bits in addition."""
-        self.repeated = repeated
-        """Frames that are repeated in a row, if not as the profile has it [1]."""
+        traffic = traffic or traffic_of(network)
+        self.traffic = traffic if model == WORST else replace(traffic, is_stuffed=False)
+        """SYNC, PDOs and other messages, by default the network's; their frames as long as in the timing model."""
 
     @property
     def rates(self) -> tuple[Rate, ...]:
@@ -137,15 +130,6 @@ class CanCycle(BusCycle):
     def _due(self) -> frozenset[str] | None:
         """Their names; None for the cycle that the verdict is for, which no other exceeds."""
         return None if self.number is None else frozenset(group.name for group in self._groups)
-
-    @cached_property
-    def traffic(self) -> Traffic:
-        """SYNC, PDOs and other messages, their frames as long as in the timing model."""
-        traffic = traffic_of(self.network)
-        if self.repeated is not None:
-            traffic = replace(traffic, error_burst=self.repeated)
-        traffic = traffic.longest if self.is_longest else traffic
-        return traffic if self.model == WORST else replace(traffic, is_stuffed=False)
 
     def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
         """Time of a frame of the cycle, or of a message [us]."""
@@ -409,9 +393,11 @@ class CanCycle(BusCycle):
             return self._terms["cycle_wait_us"] + self._terms["cycle_host_us"]
         if not self.traffic.queues:
             return 0.0
-        by_priority = CanCycle(self.network, self.model, self.number, repeated=self.repeated)
-        by_priority.traffic = replace(self.traffic, queues=frozenset())
-        return larger(self.required_us - by_priority.required_us, 0.0)
+        return larger(self.required_us - self._of(replace(self.traffic, queues=frozenset())).required_us, 0.0)
+
+    def _of(self, traffic: Traffic) -> "CanCycle":
+        """The same cycle with other traffic."""
+        return CanCycle(self.network, self.model, self.number, traffic=traffic)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time and longer FD frames, by half of what they change; and the host's own time."""
@@ -426,8 +412,7 @@ class CanCycle(BusCycle):
         doubts = Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
         if self.traffic.longest is self.traffic:
             return doubts
-        longest = CanCycle(self.network, self.model, self.number, repeated=self.repeated, is_longest=True)
-        late_us = (longest.required_us - self.required_us) / 2
+        late_us = (self._of(self.traffic.longest).required_us - self.required_us) / 2
         key = "bus.clock_tolerance" if bus.clock_tolerance else "fd_late_bits"
         return *doubts, Doubt(key, "longer bits and FD frames", late_us)
 
@@ -524,7 +509,8 @@ class CanCycle(BusCycle):
 
     def _late_with(self, repeated: int) -> str:
         """What is late, or not shown to be in time, with some repeated frames in a row; empty where nothing is."""
-        trial = CanCycle(self.network, self.model, repeated=repeated, is_longest=True)
+        traffic = replace(traffic_of(self.network), error_burst=repeated).longest
+        trial = CanCycle(self.network, self.model, traffic=traffic)
         for message, worst in message_responses(trial.traffic, is_verdict=True):
             if not within(worst.us, message.deadline_us):
                 return message.name
@@ -537,7 +523,7 @@ class CanCycle(BusCycle):
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
         if self.model == WORST and self.traffic.longest is not self.traffic:
-            return CanCycle(self.network, WORST, self.number, is_longest=True).latencies()
+            return self._of(self.traffic.longest).latencies()
         sync = ((SYNC, ""),) if self.traffic.has_sync else ()
         cycle = (*sync, *((pdos.name, pdos.group) for pdos in self.traffic.pdos))
         names = (*cycle, *((message.name, "") for message in self.traffic.messages))

@@ -204,13 +204,14 @@ def _payload_words(network: Network) -> str:
     return f"a PDO of {plain(over.payload_bytes):.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 
-def _load(network: Network) -> Number:
-    return CanCycle(network, WORST, is_longest=True).load
+def _longest(network: Network) -> CanCycle:
+    """The cycle with FD frames and bits as long as they may be."""
+    return CanCycle(network, WORST, traffic=traffic_of(network).longest)
 
 
 def _late_load(network: Network) -> Number:
     """Part of the load that the bits that FD frames may take in addition make [1]."""
-    return _load(network) - CanCycle(network, WORST).load
+    return _longest(network).load - CanCycle(network, WORST).load
 
 
 def _when_full(load: float) -> str:
@@ -219,7 +220,7 @@ def _when_full(load: float) -> str:
 
 
 def _load_words(network: Network) -> str:
-    load, most = plain(_load(network)), network.profile.most_load
+    load, most = plain(_longest(network).load), network.profile.most_load
     over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
     return f"the bus load is {load:.1%}, over {over}{_when_full(load)}"
 
@@ -275,11 +276,11 @@ LIMITS: Final = (
     Limit(
         "load",
         _load_words,
-        _load,
+        lambda network: _longest(network).load,
         lambda network: network.profile.most_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         perhaps=_late_load,
-        period=lambda limit, network: CanCycle(network, WORST, is_longest=limit.perhaps is None).load_period_us,
+        period=lambda limit, network: (CanCycle(network, WORST) if limit.perhaps else _longest(network)).load_period_us,
         has_rule=True,
     ),
     Limit(
@@ -315,7 +316,7 @@ LIMITS: Final = (
 def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
     if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
-        load, most = plain(_load(subject.network)), subject.network.profile.most_load
+        load, most = plain(_longest(subject.network).load), subject.network.profile.most_load
         yield RuleProblem(
             "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )
