@@ -114,11 +114,11 @@ def test_the_document_has_the_same_keys_for_every_kind() -> None:
     own, can = PAPER.to_dict()["buses"]
     assert (own["is_own"], own["assumed"], own["left_out"]) == (True, [], [])
     assert can["assumed"][0] == {"key": "bus.bit_rate_kbit_s", "value": 1000, "source": "new profile"}
-    assert GANTRY.to_dict()["counted_group"] == "drives"
+    assert GANTRY.to_dict()["group"] == "drives"
 
 
 def test_a_kind_that_cannot_have_it_is_a_row_with_the_reason(tmp_path: Path) -> None:
-    long = busplan.load_profile("ethercat-servo-8", changes={"node.cable_m": 100.0})
+    long = busplan.load_profile("ethercat-servo-8", changes={"node.cable_length_m": 100.0})
     found = busplan.compare(long, buses=["ethercat", "ieee1394"])
     assert row(found, "IEEE 1394") == ["IEEE", "1394", *"---", "not", "compared", *"----"]
     assert any(line.startswith("IEEE 1394 cannot have this machine: bus.gap_count: ") for line in lines_of(found))
