@@ -336,7 +336,7 @@ def test_a_lower_message_blocks_as_often_as_its_deadline_lets_it() -> None:
 def test_the_host_is_a_doubt_of_each_command() -> None:
     arm = busplan.load_profile("can-motors-8", changes={"bus.host_us": 20.0, "bus.host_uncertainty_us": 5.0})
     found = figures(arm)
-    assert next(doubt.us for doubt in found.doubts if doubt.key == "bus.host_us") == arm.bus.nodes * 5.0
+    assert next(doubt.us for doubt in found.doubts if doubt.key == "bus.host_us") == 8 * 5.0
 
 
 def main(first: int, number: int) -> None:
