@@ -131,8 +131,8 @@ def sweep_command(
             "same versions of Python, busplan and numpy. Needs the extra cluster (distributed).  [default: here]",
         ),
     ] = None,
-    force: Annotated[
-        bool, option("--force", "Run more than 1,000 circle tests, which --circle alone refuses.")
+    unlimited: Annotated[
+        bool, option("--unlimited", "Run more than 1,000 circle tests, which --circle alone refuses.")
     ] = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
@@ -147,7 +147,7 @@ def sweep_command(
     of_top = {"--sort": sort, "--top": top}
     require_company(f"--format table, markdown or html; {form} has every row", of_top, is_given=has_top)
     require_company("--plot FILE", {"--figure": figure}, is_given=plot)
-    of_circle = {"--jobs": jobs, "--cluster": cluster, "--force": force, "--summary": summary}
+    of_circle = {"--jobs": jobs, "--cluster": cluster, "--unlimited": unlimited, "--summary": summary}
     require_company("--circle", of_circle, is_given=circle)
     if cluster is not None and jobs is not None:
         raise BusplanError(
@@ -176,7 +176,7 @@ def sweep_command(
         group=group,
         circle=circle,
         summary=summary,
-        force=force,
+        unlimited=unlimited,
         changes=changes,
     )
     sweep.require_number(sort_by or None, name="--sort")
