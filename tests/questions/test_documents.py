@@ -45,13 +45,13 @@ OPTIONS: dict[str, Callable[[], Any]] = {
         )
     ),
     "plan paper-1ms --nodes 6 --period 500us --set bus.gap_count=63": lambda: busplan.plan(
-        "paper-1ms", nodes=6, period_us=500, gap_count=63
+        "paper-1ms", nodes=6, period_us=500, changes={"bus.gap_count": 63}
     ),
     "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count": lambda: busplan.plan(
-        "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"]
+        "paper-1ms", axes=15, changes={"limits.reserve": 0.125}, free=["gap_count", "responses"]
     ),
     "plan paper-1ms --axes 9 --set node.axes=3 --set bus.speed=S200": lambda: busplan.plan(
-        "paper-1ms", axes=9, wanted={"node.axes": 3, "bus.speed": "S200"}
+        "paper-1ms", axes=9, changes={"node.axes": 3, "bus.speed": "S200"}
     ),
     "timeline paper-1ms --timing-model standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
