@@ -114,7 +114,7 @@ def test_the_document_has_the_same_keys_for_every_kind() -> None:
     own, can = PAPER.to_dict()["buses"]
     assert (own["is_own"], own["assumed"], own["left_out"]) == (True, [], [])
     assert can["assumed"][0] == {"key": "bus.bit_rate_kbit_s", "value": 1000, "source": "new profile"}
-    assert GANTRY.to_dict()["counted_group"] == "drives"
+    assert GANTRY.to_dict()["group"] == "drives"
 
 
 def test_a_kind_that_cannot_have_it_is_a_row_with_the_reason(tmp_path: Path) -> None:
