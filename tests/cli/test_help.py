@@ -148,6 +148,12 @@ def test_every_parameter_says_what_it_is_its_unit_its_default_and_what_may_stand
 
 
 @EVERY_COMMAND
+def test_a_default_is_said_once(name: str) -> None:
+    for param, words in parameters(name):
+        assert words.count("[default") <= 1, param.name
+
+
+@EVERY_COMMAND
 def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str) -> None:
     here = context(name)
     params = [param for param in here.command.get_params(here) if param.param_type_name == "option"]

@@ -25,7 +25,6 @@ from busplan.cli.options import (
     format_option,
     load_changed,
     load_each,
-    option,
     parse_sizes,
     periods_us,
     plot_form,
@@ -50,15 +49,7 @@ def capacity_command(
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
     timing_model: TimingModelOption = "both",
-    sensitivity: Annotated[
-        bool,
-        option(
-            "--sensitivity",
-            "Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
-            "one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these "
-            "rows instead.",
-        ),
-    ] = False,
+    sensitivity: bool = False,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -70,6 +61,12 @@ def capacity_command(
     change. The figures follow; a low terminal shows them with --all. Times are in us. Exits 0 with any verdict.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
+
+    Parameters
+    ----------
+    --sensitivity
+        Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or one retry
+        more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these rows instead.
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.capacity import capacity
@@ -99,14 +96,7 @@ def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges)
 @takes_changes()
 def latency_command(
     profile: ProfileArgument,
-    payload: Annotated[
-        str | None,
-        option(
-            "--payload BYTES[,BYTES...]",
-            "Payload of both read and write in bytes, or several with commas, as 4,16,32.  [default: the profile's "
-            "payload.read_bytes and payload.write_bytes]",
-        ),
-    ] = None,
+    payload: str | None = None,
     changes: KeyChanges = NO_CHANGES,
     timing_model: TimingModelOption = "both",
     all_: AllOption = False,
@@ -121,6 +111,12 @@ def latency_command(
     the whole cycle. Times are in us, sizes in bytes; each phase has its equation or source. Exits 0 with any figures.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
+
+    Parameters
+    ----------
+    --payload BYTES[,BYTES...]
+        Payload of both read and write in bytes, or several with commas, as 4,16,32. [default: the profile's
+        payload.read_bytes and payload.write_bytes]
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.latency import latency
@@ -139,29 +135,10 @@ def circle_test_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
-    contributions: Annotated[
-        bool, option("--contributions", "Rank the error sources: run the test again without each of them.")
-    ] = False,
-    trace: Annotated[
-        Path | None,
-        option(
-            "--trace FILE.csv",
-            "Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is "
-            "replaced.  [default: no file]",
-        ),
-    ] = None,
-    every: Annotated[
-        int | None, option("--every N", "Write one of N steps of the simulation to --trace.  [default: 10]", min=1)
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        option(
-            "--plot FILE",
-            "Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, "
-            "into FILE.svg or FILE.png; an old file is replaced. PNG needs the extra plot (resvg-py).  "
-            "[default: no figure]",
-        ),
-    ] = None,
+    contributions: bool = False,
+    trace: Path | None = None,
+    every: Annotated[int | None, typer.Option(min=1)] = None,
+    plot: Path | None = None,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -175,6 +152,19 @@ def circle_test_command(
     them on a whole turn. Exits 0 when the test passes or the circle is not judged, and 1 when it fails.
 
     Example: busplan circle-test paper-4ms --contributions
+
+    Parameters
+    ----------
+    --contributions
+        Rank the error sources: run the test again without each of them.
+    --trace FILE.csv
+        Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is replaced.
+        [default: no file]
+    --every N
+        Write one of N steps of the simulation to --trace. [default: 10]
+    --plot FILE
+        Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, into FILE.svg
+        or FILE.png; an old file is replaced. PNG needs the extra plot (resvg-py). [default: no figure]
     """
     require_company("--trace FILE.csv", {"--every": every}, is_given=trace)
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
@@ -225,47 +215,12 @@ def _naming(profile: str, period: list[str] | None) -> Iterator[None]:
 @takes_changes(period=True)
 def timeline_command(
     profile: ProfileArgument,
-    from_: Annotated[
-        str | None,
-        option(
-            "--from TIME",
-            "Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.  "
-            "[default: its start]",
-        ),
-    ] = None,
-    to: Annotated[
-        str | None,
-        option(
-            "--to TIME",
-            "Show the cycle up to this time, with its unit; beyond its end means its end.  [default: its end]",
-        ),
-    ] = None,
-    transaction: Annotated[
-        str | None,
-        option(
-            "--transaction NAME:N",
-            "Show one transaction of one node (from 1) with its gaps, by its name on this bus, as read:1, feedback:1, "
-            "frame:1 or mdt:1; a wrong name lists the right ones. --from and --to may narrow it further.  [default: "
-            "all of them]",
-        ),
-    ] = None,
-    cycle: Annotated[
-        int | None,
-        option(
-            "--cycle N",
-            "Show the N-th cycle, from 1, of groups with rates of their own (every = n, on CAN and EtherCAT); beyond "
-            "their common multiple the cycles repeat.  [default: the fullest, which the verdict is for]",
-        ),
-    ] = None,
+    from_: str | None = None,
+    to: str | None = None,
+    transaction: str | None = None,
+    cycle: int | None = None,
     changes: KeyChanges = NO_CHANGES,
-    timing_model: Annotated[
-        str | None,
-        option(
-            "--timing-model MODEL",
-            "Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard.  [default: the "
-            "profile's bus.timing_model, where it is applicable]",
-        ),
-    ] = None,
+    timing_model: str | None = None,
     all_: AllOption = False,
     format_: DrawnFormatOption = None,
     output: DrawnOutputOption = None,
@@ -278,6 +233,22 @@ def timeline_command(
     otherwise. Times are in us. Exits 0 with any verdict.
 
     Example: busplan timeline paper-4ms --transaction read:1
+
+    Parameters
+    ----------
+    --from TIME
+        Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms. [default: its start]
+    --to TIME
+        Show the cycle up to this time, with its unit; beyond its end means its end. [default: its end]
+    --transaction NAME:N
+        Show one transaction of one node (from 1) with its gaps, by its name on this bus, as read:1, feedback:1, frame:1
+        or mdt:1; a wrong name lists the right ones. --from and --to may narrow it further. [default: all of them]
+    --cycle N
+        Show the N-th cycle, from 1, of groups with rates of their own (every = n, on CAN and EtherCAT); beyond their
+        common multiple the cycles repeat. [default: the fullest, which the verdict is for]
+    --timing-model MODEL
+        Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. [default: the profile's
+        bus.timing_model, where it is applicable]
     """
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
@@ -304,34 +275,11 @@ def complete_figure(incomplete: str) -> list[str]:
 @takes_changes()
 def explain_command(
     profile: ProfileArgument,
-    figure: Annotated[
-        str | None,
-        typer.Argument(
-            help="A key in the JSON of capacity or latency, as required_us (latency.gaps_us where both have it); the "
-            'number of an equation, as "(11)"; a label of a table, as arbitration; or a transaction, a message or a '
-            "group of nodes, for its latency.  [default: what the verdict rests on, and a list of all figures]",
-            autocompletion=complete_figure,
-            show_default=False,
-        ),
-    ] = None,
+    figure: Annotated[str | None, typer.Argument(autocompletion=complete_figure)] = None,
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
-    timing_model: Annotated[
-        str | None,
-        option(
-            "--timing-model MODEL|both",
-            "Timing model; bias and uncertainty have only the one that decides.  [default: the profile's "
-            "bus.timing_model]",
-        ),
-    ] = None,
-    transaction: Annotated[
-        str | None,
-        option(
-            "--transaction NAME",
-            "For a figure of latency: the name of the transaction or message, as read, SYNC or loop. A wrong name "
-            "lists the right ones.  [default: all]",
-        ),
-    ] = None,
+    timing_model: str | None = None,
+    transaction: str | None = None,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -343,6 +291,18 @@ def explain_command(
     searched for, compared or simulated has no equation: capacity and circle-test show it. Exits 0 with any figures.
 
     Example: busplan explain paper-4ms required_us
+
+    Parameters
+    ----------
+    FIGURE
+        A key in the JSON of capacity or latency, as required_us (latency.gaps_us where both have it); the number of an
+        equation, as "(11)"; a label of a table, as arbitration; or a transaction, a message or a group of nodes, for
+        its latency. [default: what the verdict rests on, and a list of all figures]
+    --timing-model MODEL|both
+        Timing model; bias and uncertainty have only the one that decides. [default: the profile's bus.timing_model]
+    --transaction NAME
+        For a figure of latency: the name of the transaction or message, as read, SYNC or loop. A wrong name lists the
+        right ones. [default: all]
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.base.inputs import checked_models, load_network
@@ -377,19 +337,9 @@ def report_command(
     ],
     format_: Annotated[Form | None, format_option("html")] = None,
     output: OutputOption = None,
-    title: Annotated[
-        str | None,
-        option("--title TEXT", "Heading of the page.  [default: the profile's name, or the number of profiles]"),
-    ] = None,
+    title: str | None = None,
     changes: KeyChanges = NO_CHANGES,
-    circle: Annotated[
-        bool | None,
-        typer.Option(
-            "--circle/--no-circle",
-            help="Run the circle test of profiles that ask for one.  [default: where servo values are measured]",
-            show_default=False,
-        ),
-    ] = None,
+    circle: bool | None = None,
 ) -> None:
     """Put the answers for a profile on one page, for a screen, a machine's file or a repository.
 
@@ -398,6 +348,13 @@ def report_command(
     and no script. Exits 0 with any verdict.
 
     Example: busplan report paper-4ms paper-1ms -o report.html
+
+    Parameters
+    ----------
+    --title TEXT
+        Heading of the page. [default: the profile's name, or the number of profiles]
+    --circle/--no-circle
+        Run the circle test of profiles that ask for one. [default: where servo values are measured]
     """
     from busplan.english import has_controls
 

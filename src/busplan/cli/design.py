@@ -55,36 +55,11 @@ _LONGEST_DESCRIPTION = 2000
 @takes_changes("Part of the goal, as --period: it is kept, and --apply and -o write it.", period=True)
 def plan_command(
     profile: ProfileArgument,
-    nodes: Annotated[
-        int | None,
-        option(
-            "--nodes N", "Goal: number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]"
-        ),
-    ] = None,
+    nodes: int | None = None,
     changes: KeyChanges = NO_CHANGES,
-    axes: Annotated[
-        int | None,
-        option(
-            "--axes N",
-            "Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes.  [default: "
-            "the axes of the nodes]",
-            min=1,
-            max=_MAX_AXES,
-        ),
-    ] = None,
-    free: Annotated[
-        str | None,
-        option(
-            "--free NAMES",
-            "Settings that may change, with commas, in the order of their cost: gap_count, slice_ratio, responses "
-            "(reads concatenated, writes unified), schedule (where the bus has one), payload (less), period, nodes "
-            "(fewer).  [default: gap_count,slice_ratio,period]",
-        ),
-    ] = None,
-    apply: Annotated[
-        bool,
-        option("--apply", "Write the recommended values into PROFILE, a file; comments and layout stay as they are."),
-    ] = False,
+    axes: Annotated[int | None, typer.Option(min=1, max=_MAX_AXES)] = None,
+    free: str | None = None,
+    apply: bool = False,
     output: Annotated[
         Path | None,
         option(
@@ -95,7 +70,7 @@ def plan_command(
             "output]",
         ),
     ] = None,
-    force: Annotated[bool, option("--force", "Let -o NEW.toml overwrite a file that is already there.")] = False,
+    force: bool = False,
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
@@ -110,6 +85,22 @@ def plan_command(
     plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
+
+    Parameters
+    ----------
+    --nodes N
+        Goal: number of distributed nodes, the host not counted. [default: the profile's bus.nodes]
+    --axes N
+        Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes. [default: the axes of
+        the nodes]
+    --free NAMES
+        Settings that may change, with commas, in the order of their cost: gap_count, slice_ratio, responses (reads
+        concatenated, writes unified), schedule (where the bus has one), payload (less), period, nodes (fewer).
+        [default: gap_count,slice_ratio,period]
+    --apply
+        Write the recommended values into PROFILE, a file; comments and layout stay as they are.
+    --force
+        Let -o NEW.toml overwrite a file that is already there.
     """
     if nodes is not None:
         changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.entries))
@@ -218,32 +209,11 @@ def _say_report(changes: KeyChanges, result: "Answer") -> None:
 @takes_changes("For a bench that differed from the profile: --apply does not write it.")
 def calibrate_command(
     profile: ProfileArgument,
-    measurements: Annotated[
-        str,
-        typer.Argument(
-            help="A CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.",
-            show_default=False,
-        ),
-    ],
-    group: Annotated[
-        str | None,
-        option(
-            "--group NAME", "In a profile with groups: the group of nodes that was measured.  [default: its one group]"
-        ),
-    ] = None,
-    timing_model: Annotated[
-        str | None,
-        option("--timing-model MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
-    ] = None,
+    measurements: str,
+    group: str | None = None,
+    timing_model: str | None = None,
     changes: KeyChanges = NO_CHANGES,
-    apply: Annotated[
-        bool,
-        option(
-            "--apply",
-            "Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
-            "your own comments stay.",
-        ),
-    ] = False,
+    apply: bool = False,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -261,6 +231,18 @@ def calibrate_command(
     Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv
+
+    Parameters
+    ----------
+    MEASUREMENTS
+        A CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.
+    --group NAME
+        In a profile with groups: the group of nodes that was measured. [default: its one group]
+    --timing-model MODEL
+        Timing model that computes the packets. [default: the one that decides]
+    --apply
+        Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; your own
+        comments stay.
     """
     if profile == measurements == "-":
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
@@ -310,34 +292,11 @@ def _measurements_file(argument: str) -> Iterator[Path]:
 @takes_changes("For a machine that was recorded with another value: --apply does not write it.")
 def measured_command(
     profile: ProfileArgument,
-    recording: Annotated[
-        str,
-        typer.Argument(
-            help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or "
-            "TRC, or a capture of SocketCAN.",
-            show_default=False,
-        ),
-    ],
-    quantile: Annotated[
-        float,
-        option(
-            "--quantile SHARE",
-            "Share of the cycles that jitter and times are to hold for, 0.5..1 [1].  [default: 1, the worst recorded]",
-        ),
-    ] = 1.0,
-    channel: Annotated[
-        str | None,
-        option("--channel NAME", "Channel of a CAN log.  [default: the only one]"),
-    ] = None,
+    recording: str,
+    quantile: float = 1.0,
+    channel: str | None = None,
     changes: KeyChanges = NO_CHANGES,
-    apply: Annotated[
-        bool,
-        option(
-            "--apply",
-            "Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
-            "comments stay.",
-        ),
-    ] = False,
+    apply: bool = False,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -350,6 +309,19 @@ def measured_command(
     us. `busplan manual measured` says how each figure is measured. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
+
+    Parameters
+    ----------
+    RECORDING
+        A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or TRC, or a
+        capture of SocketCAN.
+    --quantile SHARE
+        Share of the cycles that jitter and times are to hold for, 0.5..1 [1]. [default: 1, the worst recorded]
+    --channel NAME
+        Channel of a CAN log. [default: the only one]
+    --apply
+        Write the values that were measured into the file PROFILE, with a comment on their origin; your own comments
+        stay.
     """
     if apply:
         require_own_file(profile)
@@ -373,19 +345,10 @@ def measured_command(
 @takes_changes("For a machine that differs from its plan.", period=True)
 def emulate_command(
     profile: ProfileArgument,
-    cycles: Annotated[int | None, option("--cycles N", "Length of the recording, in cycles.  [default: 1000]")] = None,
-    duration: Annotated[
-        str | None, option("--duration TIME", "The same as a time with its unit.  [default: --cycles]")
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        option(
-            "--fault NAME[=VALUE]",
-            "A fault of the machine; may be repeated. VALUE is how often it happens, as lost-frame=3, or how late, as "
-            "jitter=50us.  [default: 5 times, a share of the period]",
-        ),
-    ] = None,
-    seed: Annotated[int, option("--seed N", "Of jitter and data: the same gives the same bytes.  [default: 1]")] = 1,
+    cycles: int | None = None,
+    duration: str | None = None,
+    fault: list[str] | None = None,
+    seed: int = 1,
     changes: KeyChanges = NO_CHANGES,
     output: Annotated[Path | None, output_option("Write the recording to FILE.pcapng, FILE.log or .candump")] = None,
 ) -> None:
@@ -396,6 +359,18 @@ def emulate_command(
     CAN: missing-cycle, missing-pdo, double-pdo, late-command, jitter, error-frame. Exits 0 when it is written.
 
     Example: busplan emulate can-servo-8 --fault late-command -o log.candump
+
+    Parameters
+    ----------
+    --cycles N
+        Length of the recording, in cycles. [default: 1000]
+    --duration TIME
+        The same as a time with its unit. [default: --cycles]
+    --fault NAME[=VALUE]
+        A fault of the machine; may be repeated. VALUE is how often it happens, as lost-frame=3, or how late, as
+        jitter=50us. [default: 5 times, a share of the period]
+    --seed N
+        Of jitter and data: the same gives the same bytes. [default: 1]
     """
     require_apart({"--output": output}, inputs=profile_files(profile))
     from busplan.questions.emulate import emulate, emulator_of
@@ -441,9 +416,7 @@ def map_command(
     x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
     y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
     changes: KeyChanges = NO_CHANGES,
-    circle: Annotated[
-        bool, option("--circle", "Also run the circle test of every cell that fits, up to 1,000.")
-    ] = False,
+    circle: bool = False,
     jobs: JobsOption = None,
     all_: AllOption = False,
     format_: DrawnFormatOption = None,
@@ -457,6 +430,11 @@ def map_command(
     Exits 0 with any verdict.
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
+
+    Parameters
+    ----------
+    --circle
+        Also run the circle test of every cell that fits, up to 1,000.
     """
     require_company("--circle", {"--jobs": jobs}, is_given=circle)
     files = profile_files(profile)
@@ -485,7 +463,7 @@ def explore_command(
         option("--over KEY=VALUES", f"A third key: {VALUES_HELP}  [default: the larger payload of a node]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
-    circle: Annotated[bool, option("--circle", "Also run the circle test of every setting that fits.")] = False,
+    circle: bool = False,
     jobs: JobsOption = None,
     format_: DrawnFormatOption = None,
     output: DrawnOutputOption = None,
@@ -497,6 +475,11 @@ def explore_command(
     all. Exits 0 with any verdict.
 
     Example: busplan explore gantry-24 -o gantry-24.html
+
+    Parameters
+    ----------
+    --circle
+        Also run the circle test of every setting that fits.
     """
     require_company("--circle", {"--jobs": jobs}, is_given=circle)
     files = profile_files(profile)
@@ -526,14 +509,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
 @takes_changes("It changes the profile before that is put on other kinds.", period=True)
 def compare_command(
     profile: ProfileArgument,
-    buses: Annotated[
-        str | None,
-        option(
-            "--buses KIND[,KIND...]",
-            "Kinds of bus, by their bus.kind.  [default: all, the profile's own first]",
-            autocompletion=_complete_kinds,
-        ),
-    ] = None,
+    buses: Annotated[str | None, typer.Option(autocompletion=_complete_kinds)] = None,
     changes: KeyChanges = NO_CHANGES,
     all_: AllOption = False,
     format_: DrawnFormatOption = None,
@@ -550,6 +526,11 @@ def compare_command(
     shown to fit; the most axes are those at the profile's period. Exits 0 with any verdict.
 
     Example: busplan compare gantry-24
+
+    Parameters
+    ----------
+    --buses KIND[,KIND...]
+        Kinds of bus, by their bus.kind. [default: all, the profile's own first]
     """
     files = profile_files(profile)
     with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
@@ -569,24 +550,11 @@ def import_command(
             show_default=False,
         ),
     ],
-    output: Annotated[
-        Path | None,
-        option("--output,-o NEW.toml", "Write the profile to a new file.  [default: standard output]"),
-    ] = None,
-    bus: Annotated[str | None, option("--bus NAME", "Bus of a database of messages.  [default: the only one]")] = None,
-    channel: Annotated[
-        str | None,
-        option("--channel NAME", "Channel of a CAN log.  [default: the only one]"),
-    ] = None,
-    period: Annotated[
-        str | None,
-        option(
-            "--period TIME",
-            "Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan "
-            "is not shown to fit.  [default: such messages are left out]",
-        ),
-    ] = None,
-    force: Annotated[bool, option("--force", "Let -o overwrite a file that is already there.")] = False,
+    output: Path | None = None,
+    bus: str | None = None,
+    channel: str | None = None,
+    period: str | None = None,
+    force: bool = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
@@ -599,6 +567,20 @@ def import_command(
     when the profile is written, with any verdict.
 
     Example: busplan import machine.xml slaves.txt -o machine.toml
+
+    Parameters
+    ----------
+    --output,-o NEW.toml
+        Write the profile to a new file. [default: standard output]
+    --bus NAME
+        Bus of a database of messages. [default: the only one]
+    --channel NAME
+        Channel of a CAN log. [default: the only one]
+    --period TIME
+        Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is not
+        shown to fit. [default: such messages are left out]
+    --force
+        Let -o overwrite a file that is already there.
     """
     if paths.count("-") > 1:
         raise BusplanError("-: only one FILE can be standard input")

@@ -78,84 +78,23 @@ def check_command(
         ),
     ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
-    select: Annotated[
-        str | None, option("--select CODES", "Rules that count, as BP1,BP301: beginnings of codes.  [default: all]")
-    ] = None,
-    ignore: Annotated[
-        str | None,
-        option("--ignore CODES", "Rules that do not count, as BP112; the longest beginning decides.  [default: none]"),
-    ] = None,
-    show_suppressed: Annotated[
-        bool, option("--show-suppressed", "Also name suppressed findings, each with its reason.")
-    ] = False,
-    fail_on: Annotated[
-        Literal["error", "warning"] | None,
-        option("--fail-on", "Least severity that fails the check.  [default: error]"),
-    ] = None,
-    exit_zero: Annotated[bool, option("--exit-zero", "Exit 0 even with findings; 2 stays 2.")] = False,
-    circle: Annotated[
-        bool | None,
-        typer.Option(
-            "--circle/--no-circle",
-            help="Run the circle test of profiles that ask for one, or leave it out.  [default: run it]",
-            show_default=False,
-        ),
-    ] = None,
-    circle_steps: Annotated[
-        int | None,
-        option(
-            "--circle-steps N",
-            "Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of it.  "
-            "[default: 10000000]",
-            min=1,
-        ),
-    ] = None,
-    baseline: Annotated[
-        Path | None,
-        option("--baseline FILE", "File with recorded axes and margins, which no profile may lose.  [default: none]"),
-    ] = None,
-    update_baseline: Annotated[
-        bool,
-        option(
-            "--update-baseline",
-            "Record the present axes, margins and findings in the --baseline file, and drop records without a profile. "
-            "Findings that are recorded count no more. Exits 0 when it is written.",
-        ),
-    ] = False,
-    pass_on_unmatched: Annotated[
-        bool,
-        option(
-            "--pass-on-unmatched",
-            "Let profiles without a record in the --baseline file pass, and records without a profile; without "
-            "it they exit 2.",
-        ),
-    ] = False,
-    recording: Annotated[
-        Path | None,
-        option(
-            "--recording FILE",
-            "Recording of the machine of the one profile, as `busplan measured` takes it: what is outside the plan "
-            "fails the check.  [default: none]",
-        ),
-    ] = None,
-    quantile: Annotated[
-        float,
-        option(
-            "--quantile SHARE",
-            "Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1].  [default: 1]",
-        ),
-    ] = 1.0,
-    skip_others: Annotated[
-        bool, option("--skip-others", "Skip named files without a `schema_version`, and count them.")
-    ] = False,
-    jobs: Annotated[
-        int | None, option("--jobs,-j N", "Number of processes to check with.  [default: 1]", min=1)
-    ] = None,
-    stdin_filename: Annotated[
-        str, option("--stdin-filename NAME", "Name of standard input in the report.", show_default=True)
-    ] = "<stdin>",
-    quiet: Annotated[bool, option("--quiet,-q", "No summary on standard error.")] = False,
-    verbose: Annotated[bool, option("--verbose,-v", "Also name files without findings and skipped files.")] = False,
+    select: str | None = None,
+    ignore: str | None = None,
+    show_suppressed: bool = False,
+    fail_on: Literal["error", "warning"] | None = None,
+    exit_zero: bool = False,
+    circle: bool | None = None,
+    circle_steps: Annotated[int | None, typer.Option(min=1)] = None,
+    baseline: Path | None = None,
+    update_baseline: bool = False,
+    pass_on_unmatched: bool = False,
+    recording: Path | None = None,
+    quantile: float = 1.0,
+    skip_others: bool = False,
+    jobs: Annotated[int | None, typer.Option(min=1)] = None,
+    stdin_filename: str = "<stdin>",
+    quiet: bool = False,
+    verbose: bool = False,
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
@@ -166,6 +105,47 @@ def check_command(
     the job, as with a missing file; the other files are still checked.
 
     Example: busplan check paper-1ms paper-4ms --format github
+
+    Parameters
+    ----------
+    --select CODES
+        Rules that count, as BP1,BP301: beginnings of codes. [default: all]
+    --ignore CODES
+        Rules that do not count, as BP112; the longest beginning decides. [default: none]
+    --show-suppressed
+        Also name suppressed findings, each with its reason.
+    --fail-on
+        Least severity that fails the check. [default: error]
+    --exit-zero
+        Exit 0 even with findings; 2 stays 2.
+    --circle/--no-circle
+        Run the circle test of profiles that ask for one, or leave it out. [default: run it]
+    --circle-steps N
+        Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of it. [default:
+        10000000]
+    --baseline FILE
+        File with recorded axes and margins, which no profile may lose. [default: none]
+    --update-baseline
+        Record the present axes, margins and findings in the --baseline file, and drop records without a profile.
+        Findings that are recorded count no more. Exits 0 when it is written.
+    --pass-on-unmatched
+        Let profiles without a record in the --baseline file pass, and records without a profile; without it they exit
+        2.
+    --recording FILE
+        Recording of the machine of the one profile, as `busplan measured` takes it: what is outside the plan fails the
+        check. [default: none]
+    --quantile SHARE
+        Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1]. [default: 1]
+    --skip-others
+        Skip named files without a `schema_version`, and count them.
+    --jobs,-j N
+        Number of processes to check with. [default: 1]
+    --stdin-filename NAME
+        Name of standard input in the report. [default: <stdin>]
+    --quiet,-q
+        No summary on standard error.
+    --verbose,-v
+        Also name files without findings and skipped files.
     """
     from busplan.gate.selection import nearest_settings
 
@@ -315,32 +295,12 @@ def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -
 
 @takes_changes("It holds for both profiles.")
 def diff_command(
-    a: Annotated[
-        str,
-        typer.Argument(
-            metavar="A",
-            help="The profile to compare with: a file, a shipped name, - for standard input, or REV:path for a file "
-            "as it stood in a git revision, as HEAD~1:profiles/line.toml; the path starts at the current folder.",
-            autocompletion=complete_profile,
-            show_default=False,
-        ),
-    ],
-    b: Annotated[
-        str,
-        typer.Argument(
-            metavar="B", help="The profile to judge, likewise.", autocompletion=complete_profile, show_default=False
-        ),
-    ],
+    a: Annotated[str, typer.Argument(autocompletion=complete_profile)],
+    b: Annotated[str, typer.Argument(autocompletion=complete_profile)],
     changes: KeyChanges = NO_CHANGES,
     timing_model: TimingModelOption = "both",
-    fail_on_regression: Annotated[bool, option("--fail-on-regression", "Exit 1 when a figure of B is worse.")] = False,
-    tolerance: Annotated[
-        float | None,
-        option(
-            "--tolerance PERCENT",
-            "With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
-        ),
-    ] = None,
+    fail_on_regression: bool = False,
+    tolerance: float | None = None,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -355,6 +315,18 @@ def diff_command(
     never the verdict. Which key cost what is told by check, against its baseline.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
+
+    Parameters
+    ----------
+    A
+        The profile to compare with: a file, a shipped name, - for standard input, or REV:path for a file as it stood in
+        a git revision, as HEAD~1:profiles/line.toml; the path starts at the current folder.
+    B
+        The profile to judge, likewise.
+    --fail-on-regression
+        Exit 1 when a figure of B is worse.
+    --tolerance PERCENT
+        With --fail-on-regression, how much worse a number may be than A's [%]. [default: 0]
     """
     require_company("--fail-on-regression", {"--tolerance": tolerance is not None}, is_given=fail_on_regression)
     if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0):
@@ -380,12 +352,7 @@ def complete_code(incomplete: str) -> list[str]:
 
 
 def rule_command(
-    code: Annotated[
-        str | None,
-        typer.Argument(
-            help="Code or name of a rule, as BP101 or syntax.  [default: all of them]", autocompletion=complete_code
-        ),
-    ] = None,
+    code: Annotated[str | None, typer.Argument(autocompletion=complete_code)] = None,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -395,6 +362,11 @@ def rule_command(
     Without a code it lists all rules with their severity. Exits 0.
 
     Example: busplan rule BP110
+
+    Parameters
+    ----------
+    CODE
+        Code or name of a rule, as BP101 or syntax. [default: all of them]
     """
     with answer(format_, output, is_whole=all_) as give:
         from busplan.gate.rules import rule_answer

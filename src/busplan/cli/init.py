@@ -29,10 +29,7 @@ _GROUP: Final = re.compile(
 
 
 def init_command(
-    name: Annotated[
-        str,
-        typer.Argument(help="Name of the new profile, or the path of its file; .toml is added where it is missing."),
-    ] = "my-machine",
+    name: Annotated[str, typer.Argument()] = "my-machine",
     bus: Annotated[
         str | None,
         option(
@@ -42,41 +39,13 @@ def init_command(
             autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,
-    nodes: Annotated[
-        int | None, option("--nodes N", "Nodes of the machine, the host not counted.  [default: 4]", min=1)
-    ] = None,
-    axes: Annotated[
-        int | None, option("--axes N", "Axes of the whole machine.  [default: 4 for each node]", min=1)
-    ] = None,
-    group: Annotated[
-        list[str] | None,
-        option(
-            "--group NAME:NODESxAXES[:READ/WRITE]",
-            "Nodes of the same kind: the axes of one node and, if not by --bytes-per-axis, the bytes that it sends and "
-            "receives; repeated, instead of --nodes and --axes.  [default: one group]",
-        ),
-    ] = None,
-    period: Annotated[
-        str | None,
-        option(
-            "--period TIME", "Communication period with its unit, as 1ms or 500us.  [default: a usual one of the bus]"
-        ),
-    ] = None,
-    bytes_per_axis: Annotated[
-        int | None,
-        option("--bytes-per-axis N", "Payload of each axis, in either direction [bytes].  [default: 8]", min=1),
-    ] = None,
-    host: Annotated[
-        str | None,
-        option(
-            "--host HOST",
-            "Kind of host, from which its own time is assumed; for EtherCAT hardware, tuned, real-time or stock.  "
-            "[default: tuned]",
-        ),
-    ] = None,
-    bit_rate: Annotated[
-        int | None, option("--bit-rate N", "Bit rate of CAN [kbit/s].  [default: 1000, assumed]", min=1)
-    ] = None,
+    nodes: Annotated[int | None, typer.Option(min=1)] = None,
+    axes: Annotated[int | None, typer.Option(min=1)] = None,
+    group: list[str] | None = None,
+    period: str | None = None,
+    bytes_per_axis: Annotated[int | None, typer.Option(min=1)] = None,
+    host: str | None = None,
+    bit_rate: Annotated[int | None, typer.Option(min=1)] = None,
     source: Annotated[
         str | None,
         option(
@@ -85,7 +54,7 @@ def init_command(
             autocompletion=complete_profile,
         ),
     ] = None,
-    force: Annotated[bool, option("--force", "Overwrite a file that is already there.")] = False,
+    force: bool = False,
 ) -> None:
     """Write a commented profile of your machine, and say whether it fits.
 
@@ -98,6 +67,29 @@ def init_command(
     axes, which send 32 bytes and receive 8.
 
     Example: busplan init gantry --nodes 6 --axes 24 --period 1ms
+
+    Parameters
+    ----------
+    NAME
+        Name of the new profile, or the path of its file; .toml is added where it is missing. [default: my-machine]
+    --nodes N
+        Nodes of the machine, the host not counted. [default: 4]
+    --axes N
+        Axes of the whole machine. [default: 4 for each node]
+    --group NAME:NODESxAXES[:READ/WRITE]
+        Nodes of the same kind: the axes of one node and, if not by --bytes-per-axis, the bytes that it sends and
+        receives; repeated, instead of --nodes and --axes. [default: one group]
+    --period TIME
+        Communication period with its unit, as 1ms or 500us. [default: a usual one of the bus]
+    --bytes-per-axis N
+        Payload of each axis, in either direction [bytes]. [default: 8]
+    --host HOST
+        Kind of host, from which its own time is assumed; for EtherCAT hardware, tuned, real-time or stock. [default:
+        tuned]
+    --bit-rate N
+        Bit rate of CAN [kbit/s]. [default: 1000, assumed]
+    --force
+        Overwrite a file that is already there.
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if not path.name.removesuffix(".toml").strip("."):

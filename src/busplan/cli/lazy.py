@@ -1,11 +1,13 @@
 """Commands that are loaded when they are called, and the layout of their help: plain names, and exit codes."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from copy import copy
 from importlib import import_module
+from inspect import cleandoc, signature
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Annotated, Any, Final, get_args, get_origin
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -118,6 +120,33 @@ _MODULES: Final = {
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
+def _declared(command: Callable[..., None]) -> Callable[..., None]:
+    """Give parameters of a command the usage and the help that the section Parameters of its docstring has.
+
+    An entry is an option as the help shows it, `--output,-o FILE`, or the name of an argument in capitals. Parameters
+    without an entry keep what they are annotated with.
+    """
+    words, _, listed = cleandoc(command.__doc__ or "").partition("\n\nParameters\n----------\n")
+    written = signature(command)
+    parameters = dict(written.parameters)
+    for usage, lines in re.findall(r"^(\S.*)\n((?: .*\n?)+)", listed, re.MULTILINE):
+        names, _, value = usage.partition(" ")
+        name = re.split("[,/]", names.lstrip("-"))[0].replace("-", "_").lower()
+        name = name if name in parameters else f"{name}_"
+        annotation, default = parameters[name].annotation, typer.Option() if names.startswith("-") else typer.Argument()
+        kind, info = get_args(annotation) if get_origin(annotation) is Annotated else (annotation, default)
+        info = copy(info)
+        info.help, info.show_default = " ".join(lines.split()).replace(" [default: ", "  [default: "), False
+        if names.startswith("-"):
+            info.param_decls, info.metavar = names.split(","), value or None
+        parameters[name] = parameters[name].replace(annotation=Annotated[kind, info])
+    # Typer reads the signature, and the annotations beside it.
+    command.__signature__ = written.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]
+    command.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
+    command.__doc__ = words
+    return command
+
+
 class LazyGroup(TyperGroup):
     """The program's group of commands, each loaded at its first use; its help lists them first."""
 
@@ -130,7 +159,7 @@ class LazyGroup(TyperGroup):
             single = typer.Typer(
                 add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=SETTINGS
             )
-            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(command)
+            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(_declared(command))
             self.commands[cmd_name] = get_command(single)
         return self.commands.get(cmd_name)
 

@@ -25,12 +25,7 @@ def complete_topic(incomplete: str) -> list[str]:
 
 
 def manual_command(
-    topic: Annotated[
-        str | None,
-        typer.Argument(
-            help="Topic of a page, as profile.  [default: a list of all of them]", autocompletion=complete_topic
-        ),
-    ] = None,
+    topic: Annotated[str | None, typer.Argument(autocompletion=complete_topic)] = None,
     output: Annotated[Path | None, output_option("Write the page to FILE, always as Markdown")] = None,
 ) -> None:
     """Show a reference page: profile keys, timing models, the circle test, the plan, the gate, JSON, Python, limits.
@@ -39,6 +34,11 @@ def manual_command(
     --help` describes a command and its options. Exits 0 when the page is written.
 
     Example: busplan manual profile
+
+    Parameters
+    ----------
+    TOPIC
+        Topic of a page, as profile. [default: a list of all of them]
     """
     from busplan.manual import page, topics
 
@@ -107,10 +107,7 @@ def complete_kind(incomplete: str) -> list[str]:
 
 
 def evidence_command(
-    kind: Annotated[
-        str | None,
-        typer.Argument(help="Kind of bus, as ieee1394.  [default: all of them]", autocompletion=complete_kind),
-    ] = None,
+    kind: Annotated[str | None, typer.Argument(autocompletion=complete_kind)] = None,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -122,6 +119,11 @@ def evidence_command(
     with any residuals.
 
     Example: busplan evidence ieee1394
+
+    Parameters
+    ----------
+    KIND
+        Kind of bus, as ieee1394. [default: all of them]
     """
     with answer(format_, output, is_whole=all_) as give:
         from busplan.questions.evidence import evidence

@@ -8,6 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
+import typer
+
 from busplan.cli.answering import profile_files, require_apart, write_report
 from busplan.cli.options import (
     VALUES_HELP,
@@ -59,81 +61,20 @@ def sweep_command(
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     timing_model: TimingModelOption = "both",
-    format_: Annotated[
-        SweepForm | None,
-        option(
-            "--format",
-            "Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
-            "json (one document) or parquet (typed columns; needs the extra table, pyarrow).  [default: by the ending "
-            "of --output, else table]",
-        ),
-    ] = None,
+    format_: SweepForm | None = None,
     output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
-    columns: Annotated[
-        str | None,
-        option(
-            "--columns NAMES",
-            "Figures to write, with commas, as margin_us,safe_axes: the names in `busplan capacity --format json`.  "
-            "[default: all; for the top rows the main ones]",
-        ),
-    ] = None,
-    sort: Annotated[
-        str | None,
-        option(
-            "--sort COLUMN[:asc]",
-            "Top rows: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
-        ),
-    ] = None,
-    top: Annotated[int | None, option("--top N", "Number of top rows.  [default: 20]", min=1)] = None,
-    plot: Annotated[
-        Path | None,
-        option(
-            "--plot FILE",
-            "Draw --figure into FILE.svg or FILE.png: curves where one key varies, heat maps where two do; an old "
-            "file is replaced. PNG needs the extra plot (resvg-py).  [default: no figure]",
-        ),
-    ] = None,
-    figure: Annotated[
-        str | None,
-        option(
-            "--figure COLUMN",
-            "Figure that --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us where "
-            "safe_axes does not vary]",
-        ),
-    ] = None,
-    group: Annotated[
-        str | None,
-        option(
-            "--group NAME",
-            "In a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others stay as "
-            "they are.  [default: the one with the most axes]",
-        ),
-    ] = None,
+    columns: str | None = None,
+    sort: str | None = None,
+    top: Annotated[int | None, typer.Option(min=1)] = None,
+    plot: Path | None = None,
+    figure: str | None = None,
+    group: str | None = None,
     all_: AllOption = False,
-    circle: Annotated[
-        bool,
-        option("--circle", "Also run the circle test of every point, and add its columns (errors in mm, margins)."),
-    ] = False,
-    summary: Annotated[
-        bool,
-        option(
-            "--summary",
-            "With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard "
-            "deviation, 95th percentile and worst of each figure of the circle, and the share of seeds that fail.",
-        ),
-    ] = False,
+    circle: bool = False,
+    summary: bool = False,
     jobs: JobsOption = None,
-    cluster: Annotated[
-        str | None,
-        option(
-            "--cluster ADDRESS",
-            "Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the "
-            "same versions of Python, busplan and numpy. Needs the extra cluster (distributed).  [default: here]",
-        ),
-    ] = None,
-    unlimited: Annotated[
-        bool, option("--unlimited", "Run more than 1,000 circle tests, which --circle alone refuses.")
-    ] = False,
+    cluster: str | None = None,
+    unlimited: bool = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
@@ -141,6 +82,39 @@ def sweep_command(
     FILE as it was. Exits 0 with any verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
+
+    Parameters
+    ----------
+    --format
+        Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, json (one
+        document) or parquet (typed columns; needs the extra table, pyarrow). [default: by the ending of --output, else
+        table]
+    --columns NAMES
+        Figures to write, with commas, as margin_us,safe_axes: the names in `busplan capacity --format json`. [default:
+        all; for the top rows the main ones]
+    --sort COLUMN[:asc]
+        Top rows: largest first by this column, or smallest first with :asc. [default: order of the grid]
+    --top N
+        Number of top rows. [default: 20]
+    --plot FILE
+        Draw --figure into FILE.svg or FILE.png: curves where one key varies, heat maps where two do; an old file is
+        replaced. PNG needs the extra plot (resvg-py). [default: no figure]
+    --figure COLUMN
+        Figure that --plot draws, by its name in --columns. [default: safe_axes; margin_corrected_us where safe_axes
+        does not vary]
+    --group NAME
+        In a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others stay as they
+        are. [default: the one with the most axes]
+    --circle
+        Also run the circle test of every point, and add its columns (errors in mm, margins).
+    --summary
+        With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard deviation, 95th
+        percentile and worst of each figure of the circle, and the share of seeds that fail.
+    --cluster ADDRESS
+        Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the same
+        versions of Python, busplan and numpy. Needs the extra cluster (distributed). [default: here]
+    --unlimited
+        Run more than 1,000 circle tests, which --circle alone refuses.
     """
     form = form_of_file(format_, output, forms=_ENDINGS, default="table")
     has_top = form not in ROWS_ENDINGS.values()

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import busplan
+from tests.buses.can.machines import figures, terms
 
 Run = Callable[..., Any]
 HEAD = """\
@@ -163,3 +164,25 @@ def test_a_bit_rate_that_carries_little_is_no_warning(tmp_path: Path) -> None:
     slow = (HEAD + MACHINE).replace("base_us = 50", "base_us = 1900")
     path.write_text(slow.replace("period_us = 4000", "period_us = 100000"), encoding="utf-8")
     assert busplan.check(path).findings == ()
+
+
+@pytest.mark.parametrize("name", ["can-servo-8", "can-fd-arm-7", "can-motors-8"])
+def test_slow_oscillators_are_a_doubt_of_cycle_load_and_responses(name: str) -> None:
+    exact, slow = (
+        busplan.load_profile(name, changes={"bus.clock_tolerance": share, "cycle.period_us": 1e6})
+        for share in (0.0, 0.01)
+    )
+    assert terms(slow) == terms(exact)
+    # All frames, and nothing else, take 1 % longer.
+    frames_us = sum(us for term, us in terms(exact).items() if term not in ("wait", "host"))
+    late_us, slow_us = (
+        2 * sum(doubt.us for doubt in figures(each).doubts if "bits" in doubt.label) for each in (exact, slow)
+    )
+    assert slow_us == pytest.approx(late_us + 0.01 * (frames_us + late_us))
+
+
+def test_a_load_kept_by_exact_clocks_alone_is_not_shown() -> None:
+    load = figures(busplan.load_profile("can-servo-8")).own["bus_load"]
+    for share, verdict in ((0.0, "fits"), (0.005, "fits"), (0.0158, "not shown to fit")):
+        changes = {"bus.clock_tolerance": share, "limits.max_load": 1.01 * load}
+        assert figures(busplan.load_profile("can-servo-8", changes=changes)).verdict == verdict

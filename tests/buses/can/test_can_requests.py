@@ -311,6 +311,16 @@ def test_a_new_profile_of_motors_has_no_sync(run: Run, tmp_path: Path) -> None:
     assert terms(profile)["sync"] == 0
 
 
+@pytest.mark.parametrize(("motors", "execution_us", "verdict"), [(9, 0, 1), (9, 100, 1), (9, 400, 1), (11, 0, 2)])
+def test_motors_whose_frames_may_hide_all_times_are_not_shown_not_to_fit(
+    motors: int, execution_us: int, verdict: int
+) -> None:
+    # Nine ran at 1 kHz and 5 Mbit/s; frames of eleven do not fit into a millisecond.
+    changes = {"bus.nodes": motors, "bus.host_us": 10, "cycle.period_us": 1000, "node.execution.base_us": execution_us}
+    found = busplan.capacity(busplan.load_profile("can-fd-motors-8", changes=changes)).results[0]
+    assert found.verdict == ("fits", "not shown to fit", "does not fit")[verdict]
+
+
 def main(first: int, number: int) -> None:
     """Attack many arms, and say how close they came by the way of access."""
     closest = dict.fromkeys(WAYS, 0.0)

@@ -401,7 +401,12 @@ class CanCycle(BusCycle):
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
     def possible_us(self) -> Number:
-        """What queues add that are not by priority: the test of such queues is sufficient, not exact [us]."""
+        """What the bound adds to what is surely needed [us].
+
+        It is what queues add that are not by priority, and the times of a burst that its frames may hide.
+        """
+        if self.traffic.access == "burst":
+            return self._terms["cycle_wait_us"] + self._terms["cycle_host_us"]
         if not self.traffic.queues:
             return 0.0
         by_priority = CanCycle(self.network, self.model, self.number, repeated=self.repeated)
@@ -423,7 +428,8 @@ class CanCycle(BusCycle):
             return doubts
         longest = CanCycle(self.network, self.model, self.number, repeated=self.repeated, is_longest=True)
         late_us = (longest.required_us - self.required_us) / 2
-        return *doubts, Doubt("fd_late_bits", "two more bits of each FD frame", late_us)
+        key = "bus.clock_tolerance" if bus.clock_tolerance else "fd_late_bits"
+        return *doubts, Doubt(key, "longer bits and FD frames", late_us)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The host's own time, the slowest execution, and what else is on the bus."""

@@ -106,6 +106,8 @@ class Traffic:
     """Errors that may come at once, each of which repeats a frame; 0 without errors [1]."""
     late_bits: Number = 0.0
     """Nominal bits that each FD frame takes in addition [bits]."""
+    clock_tolerance: Number = 0.0
+    """How much longer bits may be than they should, a share [1]."""
     pdos: tuple[Pdos, ...] = ()
     messages: tuple[Message, ...] = ()
     is_stuffed: bool = True
@@ -137,9 +139,22 @@ class Traffic:
 
     @cached_property
     def longest(self) -> "Traffic":
-        """The same with FD frames as long as receivers accept; itself where they are so, or there are none."""
+        """The same with the slowest oscillator, and FD frames as long as receivers accept; itself where all is so."""
         rates = self.data_bit_rate_kbit_s, *(message.data_bit_rate_kbit_s for message in self.messages)
-        return self if self.late_bits or all(map(is_off, rates)) else replace(self, late_bits=float(FD_LATE_BITS))
+        if is_off(self.clock_tolerance) and (self.late_bits or all(map(is_off, rates))):
+            return self
+        slower = 1 + self.clock_tolerance
+        messages = (
+            message._replace(data_bit_rate_kbit_s=message.data_bit_rate_kbit_s / slower) for message in self.messages
+        )
+        return replace(
+            self,
+            bit_rate_kbit_s=self.bit_rate_kbit_s / slower,
+            data_bit_rate_kbit_s=self.data_bit_rate_kbit_s / slower,
+            messages=tuple(messages),
+            late_bits=float(FD_LATE_BITS),
+            clock_tolerance=0.0,
+        )
 
     def frame_us(self, data_bytes: Number, form: "Traffic | Message") -> Number:
         """Time of a frame [us].
@@ -248,6 +263,8 @@ def _traffic(network: Network) -> Traffic:
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
         data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
         identifier_bits=bus.identifier_bits,
+        # Exact clocks are no input of a derivation.
+        clock_tolerance=_unless(bus.clock_tolerance, 0),
         error_period_us=MAX_TIME_US if bus.error_period_us is None else bus.error_period_us,
         error_burst=0 if bus.error_period_us is None else 1 if bus.error_burst is None else bus.error_burst,
         messages=tuple(_message(message, bus, network.nodes) for message in network.profile.message),
@@ -353,9 +370,14 @@ def _message(message: Any, bus: Any, nodes: Number) -> Message:
         bus.identifier_bits if message.identifier_bits is None else message.identifier_bits,
         nodes if message.per_node else 1,
         0.0 if not message.fd else bus.data_bit_rate_kbit_s if message.brs else bus.bit_rate_kbit_s,
-        # A burst of one is none, and no input of a derivation.
-        1 if isinstance(message.burst, Traced) and message.burst.value == 1 else message.burst,
+        # A burst of one is none.
+        _unless(message.burst, 1),
     )
+
+
+def _unless(number: Number, none: int) -> Number:
+    """A number; what says nothing is no input of a derivation."""
+    return none if isinstance(number, Traced) and number.value == none else number
 
 
 Points: TypeAlias = Any

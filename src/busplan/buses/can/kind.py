@@ -148,6 +148,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit"),
         "bus.host_us": Key("host"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
+        "bus.clock_tolerance": Key("df"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default=SYNC_IDENTIFIER),

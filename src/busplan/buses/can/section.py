@@ -117,6 +117,12 @@ class CanBus(BusSection):
         "first; fifo, first in first out; single-buffer; without it priority, assumed",
         examples=["fifo"],
     )
+    clock_tolerance: Annotated[float, Field(ge=0, le=0.0158, allow_inf_nan=False)] = Field(
+        default=0.0,
+        description="How much longer than they should be the bits of the slowest oscillator are, a share 0..0.0158: a "
+        "doubt of cycle, load and responses",
+        examples=[0.005],
+    )
     error_period_us: PeriodUs | None = Field(
         default=None,
         description="Shortest time between errors, each of which repeats a frame; with error_burst the mean time; "
