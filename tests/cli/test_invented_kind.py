@@ -258,7 +258,7 @@ def test_every_question_is_answered(run: Run, ring_file: Path, question: str, ha
 def test_a_machine_is_compared_on_it(run: Run, ring: Path, name: str) -> None:
     done = run("compare", name, "--buses", "ring,can", "--format", "json", cwd=ring.parent)
     on_ring, on_can = json.loads(done.stdout)["buses"]
-    assert (on_ring["kind"], on_can["kind"], on_ring["this_profile"]) == ("ring", "can", False)
+    assert (on_ring["kind"], on_can["kind"], on_ring["is_own"]) == ("ring", "can", False)
     # Its nodes cannot be in groups.
     assert [one.partition(":")[0] for one in on_ring["why_not"]] == ["bus.nodes"] * (name == "gantry-24")
     if name == "can-servo-8":

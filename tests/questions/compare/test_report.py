@@ -112,7 +112,7 @@ def test_the_document_has_the_same_keys_for_every_kind() -> None:
         assert [one["kind"] for one in document["buses"]] == list(BOTH)
         assert len({tuple(one) for one in document["buses"]}) == 1
     own, can = PAPER.to_dict()["buses"]
-    assert (own["this_profile"], own["assumed"], own["left_out"]) == (True, [], [])
+    assert (own["is_own"], own["assumed"], own["left_out"]) == (True, [], [])
     assert can["assumed"][0] == {"key": "bus.bit_rate_kbit_s", "value": 1000, "source": "new profile"}
     assert GANTRY.to_dict()["group"] == "drives"
 

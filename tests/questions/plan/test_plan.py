@@ -157,7 +157,7 @@ def test_every_step_changes_one_thing_more_until_one_is_enough() -> None:
     ]
     # A step that is not enough goes as far as it can.
     assert answer.options[2].changes == {"cycle.slice_ratio": 0.9, "bus.gap_count": 21}
-    assert answer.period_kept is False
+    assert answer.period_is_kept is False
 
 
 def test_nothing_to_change(make: Make) -> None:

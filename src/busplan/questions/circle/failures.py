@@ -116,7 +116,7 @@ class Failure(NamedTuple):
 
     def document(self) -> dict[str, Any]:
         """The failure as in the JSON document; a value that does not exist is null, and the text says why."""
-        numbers = {"value": self.value, "limit": self.limit, "default_limit": self.is_default}
+        numbers = {"value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
         return {"name": self.name, **numbers, "text": self.text}
 
     @property

@@ -274,7 +274,7 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
     head = {
         "kind": bus.kind,
         "title": machine.title,
-        "this_profile": False,
+        "is_own": False,
         "why_not": [],
         "set_by": parts_by(tested.set_by),
         "tested": parts_by(tested.parts),
@@ -291,7 +291,7 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
         return {**head, "why_not": list(machine.why), **empty, **lists}
     return {
         **head,
-        "this_profile": machine.is_own,
+        "is_own": machine.is_own,
         **fields(machine.figures, *_FIGURES),
         "verdict_after_reset": None if machine.after_reset is None else machine.after_reset.verdict,
         **_safe_record(machine.safe),

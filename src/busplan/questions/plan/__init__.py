@@ -108,7 +108,7 @@ class PlanAnswer(Answer):
         return next((option for option in self.options if option.recommended), None)
 
     @property
-    def period_kept(self) -> bool | None:
+    def period_is_kept(self) -> bool | None:
         """Whether the recommended option leaves the period of the goal as it is; None without a plan."""
         return None if self.recommended is None else PERIOD not in self.recommended.changes
 

@@ -55,7 +55,7 @@ def plan_report(plan: PlanAnswer) -> Report:
             profile=plan.profile.name,
             goal={"nodes": int(plain(plan.goal.nodes)), "axes": int(plain(plan.goal.axes))},
             free=[freedom.name for freedom in plan.free],
-            period_kept=plan.period_kept,
+            period_is_kept=plan.period_is_kept,
             recommended_changes=plan.recommended_changes,
             binding=None if plan.binding is None else {"constraint": plan.binding.key, "reason": plan.binding.why},
             relaxations=[vars(relaxation) for relaxation in plan.relaxations],
@@ -103,7 +103,7 @@ def _headline(plan: PlanAnswer) -> Sentence:
     result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
-    first = "" if plan.period_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
+    first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
     changes = settings(plan.goal, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
