@@ -118,7 +118,7 @@ def test_the_document_has_the_same_keys_for_every_kind() -> None:
 
 
 def test_a_kind_that_cannot_have_it_is_a_row_with_the_reason(tmp_path: Path) -> None:
-    long = busplan.load_profile("ethercat-servo-8", changes={"node.cable_m": 100.0})
+    long = busplan.load_profile("ethercat-servo-8", changes={"node.cable_length_m": 100.0})
     found = busplan.compare(long, buses=["ethercat", "ieee1394"])
     assert row(found, "IEEE 1394") == ["IEEE", "1394", *"---", "not", "compared", *"----"]
     assert any(line.startswith("IEEE 1394 cannot have this machine: bus.gap_count: ") for line in lines_of(found))

@@ -294,7 +294,8 @@ LIMITS: Final = (
         lambda _network: 0,
         doubt=lambda _network: 0.0,
         perhaps=_assumed_periods,
-        way_out="known periods have room",
+        way_out="give message.NAME.period_us as it is known",
+        place="message",
     ),
     Limit(
         "senders",
@@ -304,6 +305,7 @@ LIMITS: Final = (
         doubt=lambda _network: 0.0,
         perhaps=lambda network: len(_unknown_senders(network)),
         way_out="give message.NAME.sender",
+        place="bus.queue",
     ),
     Limit(
         "deadline",
