@@ -86,9 +86,7 @@ PARAMETERS_ALONE: Mapping[str | tuple[str, str], str] = {
     ("import", "name"): "that of --output",
     ("paper", "paper"): "the command is its value",
     ("paper", "kind"): "the paper is of one kind",
-    ("plan", "gap_count"): "--set bus.gap_count",
-    ("plan", "reserve"): "--set limits.reserve",
-    ("plan", "wanted"): "--set",
+    ("plan", "changes"): "--set",
     ("report", "origins"): "the profiles as typed",
 }
 """Parameters without an option of that name, of every function or of that of one command."""

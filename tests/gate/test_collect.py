@@ -173,7 +173,7 @@ def test_pipes_and_folders_called_like_profiles_are_skipped(collect: Collect) ->
         ("a\0b", "no such file"),
         ("x" * 5000, "no such file"),
         ("empty", "empty: no profile below this folder"),
-        ("paper-5ms", "shipped are can-fd-arm-7, can-servo-8, canopen-6, dvrk, "),
+        ("paper-5ms", "shipped are can-fd-arm-7, can-fd-motors-8, can-motors-8, "),
     ],
 )
 def test_what_means_nothing_is_a_failure_in_its_place(argument: str, words: str, collect: Collect) -> None:

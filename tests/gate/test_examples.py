@@ -106,7 +106,7 @@ def test_codes_are_stable(rules: Rules) -> None:
         "BP007": "execution-extrapolated",
         "BP101": "slice-overrun",
         "BP102": "other-model-overrun",
-        "BP103": "over-utilisation",
+        "BP103": "utilisation-over-limit",
         "BP104": "too-few-spare-nodes",
         "BP105": "too-few-spare-axes",
         "BP106": "too-many-nodes",

@@ -318,7 +318,7 @@ def planned(plan: dict[str, Any], *, seed: int) -> Machine:
     for group in groups_of(plan):
         port = group.get("port", "100BASE-TX")
         delay_us = group.get("delay_us", DELAYS_US[port] + more_us[port])
-        line_us += 2 * group["nodes"] * (delay_us + group.get("cable_m", 0) * CABLE_US)
+        line_us += 2 * group["nodes"] * (delay_us + group.get("cable_length_m", 0) * CABLE_US)
     host_us, jitter_us = bus.get("master_us", 0.0), bus.get("master_jitter_us", 0.0)
     least = random.uniform(0.4, 0.95)
     cycles = list(schedule_of(plan))

@@ -115,7 +115,7 @@ def ethercat_plan(random: Random) -> Plan:
 
 def port(random: Random) -> Plan:
     """Ports of a device, and the cable to it."""
-    ports: tuple[Plan, ...] = ({}, {"port": "E-bus"}, {"cable_m": random.randint(1, 20)}, {"delay_us": 0.72})
+    ports: tuple[Plan, ...] = ({}, {"port": "E-bus"}, {"cable_length_m": random.randint(1, 20)}, {"delay_us": 0.72})
     return random.choice(ports)
 
 

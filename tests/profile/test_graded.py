@@ -87,4 +87,6 @@ def test_comments_are_no_part_of_a_profile(press: Profile, tmp_path: Path) -> No
 
 def test_no_key_of_a_shipped_profile_that_is_called_assumed_is_given() -> None:
     found = grades("ethercat-servo-8")
-    assert {found[key] for key in ("bus.nodes", "bus.master_us", "payload.read_bytes", "node.cable_m")} == {"assumed"}
+    assert {found[key] for key in ("bus.nodes", "bus.master_us", "payload.read_bytes", "node.cable_length_m")} == {
+        "assumed"
+    }

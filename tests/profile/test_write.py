@@ -22,7 +22,7 @@ def test_a_written_profile_reads_to_the_same(tmp_path: Path) -> None:
         nodes_key = f"group.{profile.group[0].name}.nodes" if profile.group else "bus.nodes"
         key, value = {
             "ieee1394": ("bus.gap_count", "optimal"),
-            "can": ("bus.sync_counter", True),
+            "can": ("bus.identifier_bits", 29),
             "ethercat": ("bus.process_data", "LRD-LWR"),
             "sercos3": ("bus.version", "V1.0"),
             "sercos2": ("bus.data_rate_mbit_s", 4),

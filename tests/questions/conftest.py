@@ -284,7 +284,7 @@ def ethercat_profiles(draw: st.DrawFn) -> busplan.Profile:
             "axes": draw(st.integers(1, 3)),
             "port": draw(st.sampled_from(["100BASE-TX", "E-bus"])),
             "delay_us": draw(st.one_of(st.none(), st.floats(0.5, 1.0))),
-            "cable_m": draw(st.sampled_from([0.0, 2.5, 100.0, 101.0])),
+            "cable_length_m": draw(st.sampled_from([0.0, 2.5, 100.0, 101.0])),
             "execution": {"kind": "linear", "grade": "assumed", "base_us": 50.0, "per_byte_us": 0.1},
         },
     }

@@ -1,7 +1,8 @@
 """Each answer's document is the one that the command writes with `--format json`."""
 
 import json
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from itertools import cycle
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 
 import busplan
 from busplan.cli import app
+from busplan.manual import FOLDER
 
 # One of each other class of bus, and one of groups.
 OTHERS = ("dvrk", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
@@ -45,13 +47,13 @@ OPTIONS: dict[str, Callable[[], Any]] = {
         )
     ),
     "plan paper-1ms --nodes 6 --period 500us --set bus.gap_count=63": lambda: busplan.plan(
-        "paper-1ms", nodes=6, period_us=500, gap_count=63
+        "paper-1ms", nodes=6, period_us=500, changes={"bus.gap_count": 63}
     ),
     "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count": lambda: busplan.plan(
-        "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"]
+        "paper-1ms", axes=15, changes={"limits.reserve": 0.125}, free=["gap_count", "responses"]
     ),
     "plan paper-1ms --axes 9 --set node.axes=3 --set bus.speed=S200": lambda: busplan.plan(
-        "paper-1ms", axes=9, wanted={"node.axes": 3, "bus.speed": "S200"}
+        "paper-1ms", axes=9, changes={"node.axes": 3, "bus.speed": "S200"}
     ),
     "timeline paper-1ms --timing-model standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
@@ -131,3 +133,26 @@ def test_the_text_is_what_the_command_prints(
     printed = run(name, "sercos3-servo-8").stdout.replace("--all shows all.", "to_dict() has all figures.")
     assert f"{answer}\n" == printed
     assert capfd.readouterr() == ("", "")
+
+
+def keys_of(document: Any) -> Iterator[str]:
+    if isinstance(document, dict):
+        yield from document
+    inside = document.values() if isinstance(document, dict) else document if isinstance(document, list) else ()
+    for value in inside:
+        yield from keys_of(value)
+
+
+def test_the_manual_or_the_registered_figures_have_each_key() -> None:
+    tight = {"tolerance.max_contour_error_mm": 1e-9}
+    documents = [
+        busplan.capacity("paper-4ms", sensitivity=True).to_dict(),
+        busplan.compare("gantry-24", buses=["ieee1394", "can"]).to_dict(),
+        busplan.plan("paper-1ms", nodes=62, free=["gap_count"]).to_dict(),  # impossible
+        busplan.circle_test(busplan.load_profile("paper-1ms", changes=tight)).to_dict(),
+    ]
+    figures = {row["figure"] for row in busplan.explain("paper-4ms").to_dict()["figures"]}
+    pages = "".join(page.read_text(encoding="utf-8") for page in FOLDER.glob("*.md"))
+    named = set(re.findall(r"[\w.]+", " ".join(re.findall(r"`([^`\n]+)`", pages))))
+    unknown = {key for key in keys_of(documents) if "." not in key} - named - figures
+    assert not unknown

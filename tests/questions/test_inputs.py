@@ -103,8 +103,8 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         "payload_bytes 4.5: expected a whole number from 1 to 1,000,000",
     ),
     "a goal without keys": (
-        lambda: busplan.plan("paper-4ms", wanted=["bus.nodes"]),  # type: ignore[arg-type]
-        "wanted ['bus.nodes']: expected new values by key",
+        lambda: busplan.plan("paper-4ms", changes=["bus.nodes"]),  # type: ignore[arg-type]
+        "changes ['bus.nodes']: expected new values by key",
     ),
     "too many axes": (
         lambda: busplan.plan("paper-4ms", axes=4_000_000),

@@ -14,7 +14,7 @@ from tests.oracles.ethercat_recording import Machine, pcap, pcapng, simulated, s
 PACKETS = simulated(Machine(), 40)
 PLAN = busplan.load_profile(
     "ethercat-servo-8",
-    changes={"bus.nodes": 4, "payload.read_bytes": 10, "payload.write_bytes": 10, "node.cable_m": 0},
+    changes={"bus.nodes": 4, "payload.read_bytes": 10, "payload.write_bytes": 10, "node.cable_length_m": 0},
 )
 Recorded = dict[str, float | None]
 

@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject, told_apart
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain, smaller
 from busplan.sourced import Grade, Sourced
 
 Value = int | float | str
@@ -81,6 +81,10 @@ KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
 """Verdicts on a limit, the better first."""
 
 
+_MOST: Final = 1e300
+"""A number so large that none of a plan comes near it, and that may be subtracted from infinity."""
+
+
 class Limit(NamedTuple):
     """A `value` that must not exceed a bound, `most`, and the words for a network where it does.
 
@@ -130,7 +134,10 @@ class Limit(NamedTuple):
     def least_value(self, network: Network) -> Number:
         """Lower bound of the value: value - U, without the part that is only possible."""
         least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
-        return least if self.perhaps is None else least - self.perhaps(network)
+        if self.perhaps is None:
+            return least
+        possible = self.perhaps(network)
+        return choose(possible < inf, least - smaller(possible, _MOST), -inf)
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network surely breaks it, at the lower bound of the value: a bool, or an array of them."""

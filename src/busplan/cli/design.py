@@ -127,7 +127,7 @@ def plan_command(
             result = plan(
                 loaded.profile,
                 axes=axes,
-                wanted=changes,
+                changes=changes,
                 free=None if free is None else [name.strip() for name in free.split(",")],
             )
             if new is not None:

@@ -150,7 +150,7 @@ def format_option(default: str, *, more: str = "") -> Any:
 AllOption = Annotated[bool, option("--all", "Show everything: every row, and every column on a narrow terminal, too.")]
 FormatOption = Annotated[Form | None, format_option("table")]
 JobsOption = Annotated[
-    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]", min=1)
+    int | None, option("--jobs,-j N", "Number of processes for --circle.  [default: one for each processor]", min=1)
 ]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
 DrawnForm = Literal[Form, Picture]

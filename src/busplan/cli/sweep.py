@@ -74,7 +74,7 @@ def sweep_command(
     summary: bool = False,
     jobs: JobsOption = None,
     cluster: str | None = None,
-    force: bool = False,
+    unlimited: bool = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
@@ -113,7 +113,7 @@ def sweep_command(
     --cluster ADDRESS
         Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the same
         versions of Python, busplan and numpy. Needs the extra cluster (distributed). [default: here]
-    --force
+    --unlimited
         Run more than 1,000 circle tests, which --circle alone refuses.
     """
     form = form_of_file(format_, output, forms=_ENDINGS, default="table")
@@ -121,7 +121,7 @@ def sweep_command(
     of_top = {"--sort": sort, "--top": top}
     require_company(f"--format table, markdown or html; {form} has every row", of_top, is_given=has_top)
     require_company("--plot FILE", {"--figure": figure}, is_given=plot)
-    of_circle = {"--jobs": jobs, "--cluster": cluster, "--force": force, "--summary": summary}
+    of_circle = {"--jobs": jobs, "--cluster": cluster, "--unlimited": unlimited, "--summary": summary}
     require_company("--circle", of_circle, is_given=circle)
     if cluster is not None and jobs is not None:
         raise BusplanError(
@@ -150,7 +150,7 @@ def sweep_command(
         group=group,
         circle=circle,
         summary=summary,
-        force=force,
+        unlimited=unlimited,
         changes=changes,
     )
     sweep.require_number(sort_by or None, name="--sort")

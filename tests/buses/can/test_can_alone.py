@@ -360,7 +360,7 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
         (lambda own: busplan.plan(own, axes=4), "a plan for axes asks for one"),
         (busplan.circle_test, "messages alone have no axes that could move"),
         (lambda own: busplan.explain(own, "required_us"), "required_us: no equation leads to it"),
-        (lambda own: busplan.sweep(own, vary={"cycle.period_us": [1000]}), "no figure of capacity depends on it"),
+        (lambda own: busplan.sweep(own, vary={"cycle.period_us": [1000]}), "messages alone have no cycle"),
     ],
 )
 def test_what_asks_for_a_cycle_refuses_them(ask: Callable[[Any], Any], words: str) -> None:

@@ -311,6 +311,34 @@ def test_a_new_profile_of_motors_has_no_sync(run: Run, tmp_path: Path) -> None:
     assert terms(profile)["sync"] == 0
 
 
+@pytest.mark.parametrize(("motors", "execution_us", "verdict"), [(9, 0, 1), (9, 100, 1), (9, 400, 1), (11, 0, 2)])
+def test_motors_whose_frames_may_hide_all_times_are_not_shown_not_to_fit(
+    motors: int, execution_us: int, verdict: int
+) -> None:
+    # Nine ran at 1 kHz and 5 Mbit/s; frames of eleven do not fit into a millisecond.
+    changes = {"bus.nodes": motors, "bus.host_us": 10, "cycle.period_us": 1000, "node.execution.base_us": execution_us}
+    found = busplan.capacity(busplan.load_profile("can-fd-motors-8", changes=changes)).results[0]
+    assert found.verdict == ("fits", "not shown to fit", "does not fit")[verdict]
+
+
+def test_a_lower_message_blocks_as_often_as_its_deadline_lets_it() -> None:
+    messages = [{"name": "low", "identifier": 0x700, "payload_bytes": 8, "period_us": 20_000}]
+    alone = busplan.load_profile("can-motors-8", changes={"bus.access": "burst"})
+    alone_us = figures(alone).required_us
+    # One that has waited since its start may go, and the next one too; a short deadline leaves one.
+    for deadline_us, frames in ((20_000, 2), (500, 1)):
+        changes = {"bus.access": "burst", "message": [{**messages[0], "deadline_us": deadline_us}]}
+        arm = busplan.load_profile("can-motors-8", changes=changes)
+        found = figures(arm)
+        assert found.required_us == pytest.approx(alone_us + frames * 135)
+
+
+def test_the_host_is_a_doubt_of_each_command() -> None:
+    arm = busplan.load_profile("can-motors-8", changes={"bus.host_us": 20.0, "bus.host_uncertainty_us": 5.0})
+    found = figures(arm)
+    assert next(doubt.us for doubt in found.doubts if doubt.key == "bus.host_us") == 8 * 5.0
+
+
 def main(first: int, number: int) -> None:
     """Attack many arms, and say how close they came by the way of access."""
     closest = dict.fromkeys(WAYS, 0.0)
@@ -327,13 +355,3 @@ def main(first: int, number: int) -> None:
 
 if __name__ == "__main__":
     main(*map(int, sys.argv[1:3]))
-
-
-@pytest.mark.parametrize(("motors", "execution_us", "verdict"), [(9, 0, 1), (9, 100, 1), (9, 400, 1), (11, 0, 2)])
-def test_motors_whose_frames_may_hide_all_times_are_not_shown_not_to_fit(
-    motors: int, execution_us: int, verdict: int
-) -> None:
-    # Nine ran at 1 kHz and 5 Mbit/s; frames of eleven do not fit into a millisecond.
-    changes = {"bus.nodes": motors, "bus.host_us": 10, "cycle.period_us": 1000, "node.execution.base_us": execution_us}
-    found = busplan.capacity(busplan.load_profile("can-fd-motors-8", changes=changes)).results[0]
-    assert found.verdict == ("fits", "not shown to fit", "does not fit")[verdict]

@@ -106,7 +106,7 @@ def test_options_add_datagrams_frames_and_ways() -> None:
     assert terms(profile(node__port="100BASE-TX"))["devices"] == pytest.approx(3 * 2 * fmean(DELAYS_US))
     assert terms(profile(node__delay_us=0.7))["devices"] == pytest.approx(3 * 2 * 0.7)
     assert terms(profile(bus__master_jitter_us=7.0))["jitter"] == 7
-    assert terms(profile(node__cable_m=10.0))["cable"] == pytest.approx(3 * 10 * 2 * 0.005)
+    assert terms(profile(node__cable_length_m=10.0))["cable"] == pytest.approx(3 * 10 * 2 * 0.005)
 
 
 def test_three_frames_in_a_cycle() -> None:
@@ -436,7 +436,7 @@ def test_a_missing_clock_moves_the_axes_of_a_circle_apart() -> None:
         ({"payload.read_bytes": 1487}, ("payload",)),
         ({"payload.read_bytes": 1463, "bus.process_data": "LRD-LWR"}, ("payload",)),
         ({"payload.read_bytes": 1475, "bus.process_data": "LRW-separate"}, ("payload",)),
-        ({"node.cable_m": 100.5}, ("cable",)),
+        ({"node.cable_length_m": 100.5}, ("cable",)),
         ({"bus.nodes": 65536, "cycle.period_us": 1e7}, ("nodes",)),
         ({"cycle.period_us": 25.0}, ("node", "time")),
     ],
@@ -522,7 +522,7 @@ def test_devices_without_axes_need_no_execution_time() -> None:
 
 def test_groups_are_answered_one_by_one() -> None:
     plan = grouped(
-        {"name": "drives", "nodes": 4, "read_bytes": 12, "write_bytes": 8, "port": "100BASE-TX", "cable_m": 2.0},
+        {"name": "drives", "nodes": 4, "read_bytes": 12, "write_bytes": 8, "port": "100BASE-TX", "cable_length_m": 2.0},
         {"name": "io", "nodes": 20, "axes": 0, "read_bytes": 1, "write_bytes": 1},
     )
     (result,) = busplan.capacity(plan, timing_model=["last-byte"]).results

@@ -85,7 +85,7 @@ def test_a_gap_must_be_given_and_the_message_says_why(tmp_path: Path) -> None:
     with pytest.raises(BusplanError) as caught:
         busplan.load_profile(path)
     assert "bus.at_gap_us: missing key" in str(caught.value)
-    assert "No public figure says how long it is" in str(caught.value)
+    assert "not published: take it from the master's time slots" in str(caught.value)
 
 
 def test_a_gap_is_assumed_whoever_gives_it() -> None:

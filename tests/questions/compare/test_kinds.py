@@ -20,8 +20,7 @@ SOME = settings(max_examples=4)
 KINDS = pytest.mark.parametrize("kind", kind_names())
 BOTH = ("ieee1394", "can")
 PERIOD, FITS = "cycle.period_us", "fits"
-CABLES = ("cable_length_m", "cable_m")
-"""Length of a cable, by the names of two kinds."""
+CABLE = "cable_length_m"
 
 
 def changed(profile: Profile | str, **changes: object) -> Profile:
@@ -77,10 +76,10 @@ def assert_accounted(one: Profile, kind: str) -> None:
     cables_m = {
         key: float(str(each.value))
         for key, each in said.items()
-        if key.rpartition(".")[2] in CABLES and each.value and each.source == "file"
+        if key.rpartition(".")[2] == CABLE and each.value and each.source == "file"
     }
     for key, each in new.items():
-        if cables_m and key.rpartition(".")[2] in CABLES:
+        if cables_m and key.rpartition(".")[2] == CABLE:
             assert each.value == max(cables_m.values())
             said[key] = each
     assumed = {each.key: each.value for each in found.assumed}
@@ -120,7 +119,7 @@ def test_the_machine_stays_and_every_key_is_accounted_for(
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
     for other in kind_names():
-        longest_m = max(getattr(one.node, "cable_m", 0) for one in profile.node_groups)
+        longest_m = max(getattr(one.node, "cable_length_m", 0) for one in profile.node_groups)
         if other == "ieee1394" and longest_m > 4.5:
             with pytest.raises(busplan.BusplanError, match="cable_length_m"):
                 converted(profile, other)
@@ -135,12 +134,12 @@ def test_the_host_keeps_its_share_of_the_period_and_the_machine_its_cables() -> 
     for kind in kind_names():
         assert converted(busplan.load_profile("paper-4ms"), kind).profile.cycle.slice_ratio == 0.5
     # A length that nobody has said is that of the other kind.
-    for name, kind, key, cable_m in (
-        ("paper-1ms", "ethercat", "node.cable_m", 4.5),
+    for name, kind, key, cable_length_m in (
+        ("paper-1ms", "ethercat", "node.cable_length_m", 4.5),
         ("ethercat-servo-8", "ieee1394", "bus.cable_length_m", 2),
-        ("gantry-24", "ethercat", "group.drives.cable_m", 0),
+        ("gantry-24", "ethercat", "group.drives.cable_length_m", 0),
     ):
-        assert dotted_keys(converted(busplan.load_profile(name), kind).profile)[key].value == cable_m
+        assert dotted_keys(converted(busplan.load_profile(name), kind).profile)[key].value == cable_length_m
 
 
 @pytest.mark.parametrize(
@@ -253,7 +252,7 @@ def test_a_machine_without_axes_has_none_to_count() -> None:
 
 def test_a_kind_that_cannot_have_the_machine_says_why() -> None:
     # Cables of 100 m are longer than those of IEEE 1394.
-    long = changed("ethercat-servo-8", node__cable_m=100.0)
+    long = changed("ethercat-servo-8", node__cable_length_m=100.0)
     found = busplan.compare(long, buses=["ethercat", "ieee1394"])
     first, second = found.kinds
     assert isinstance(first, MachineOnKind)

@@ -41,7 +41,7 @@ def test_every_answer_about_the_circle_names_the_key(key: str, changes: dict[str
     assert caught.value.problems == (f"at bus.nodes = 1: {problem}",)
     own = busplan.map_(profile, x={"bus.nodes": [1, 2]}, y={"cycle.period_us": [1000]}, circle=True).design
     assert own is not None
-    assert (own.state, own.limited_by) == ("circle cannot be run", (key,))
+    assert (own.state, own.reasons) == ("circle cannot be run", (key,))
 
 
 @pytest.mark.parametrize("changes", CAUSES.values())

@@ -348,7 +348,7 @@ def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
 
 
 def test_a_plan_sets_the_payload_of_each_group_before_the_period() -> None:
-    found = busplan.plan(GANTRY, wanted={"group.drives.nodes": 9}, free=["payload", "period"]).recommended_changes
+    found = busplan.plan(GANTRY, changes={"group.drives.nodes": 9}, free=["payload", "period"]).recommended_changes
     assert found is not None
     assert set(found) == {"cycle.period_us", "group.drives.nodes"} | {
         f"group.{key}_bytes_per_axis" for key in ("drives.read", "drives.write", "tool.read", "tool.write")

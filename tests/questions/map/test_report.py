@@ -36,7 +36,7 @@ def test_axes_that_change_no_payload_are_named() -> None:
 
 
 def test_the_regions_say_what_limits_them() -> None:
-    regions = [(region.state, region.limited_by, region.binding_term) for region in SHOWN.regions]
+    regions = [(region.state, region.reasons, region.binding_term) for region in SHOWN.regions]
     assert regions == [
         ("fits", (), None),
         ("not shown to fit", ("time",), "execution"),

@@ -76,7 +76,7 @@ def assert_cells_are_those_of_capacity(answer: busplan.MapAnswer, *, step: int =
             "not shown to fit": (TIME,),
             "does not fit": broken or (TIME,),
         }
-        assert cell.limited_by == limits[cell.state]
+        assert cell.reasons == limits[cell.state]
 
 
 @given(data=st.data())
@@ -271,7 +271,7 @@ def test_circles_are_run_where_the_bus_fits_and_nowhere_else() -> None:
         (result,) = busplan.circle_test(busplan.load_profile(SMALL, changes=changes)).results
         assert cell.circle_passed == result.passed
         assert cell.state == ("fits" if result.passed else "circle fails")
-        assert cell.limited_by == tuple(failure.name for failure in result.failures)
+        assert cell.reasons == tuple(failure.name for failure in result.failures)
     fitting = sum(cell.state == "fits" for cell in plain.cells)
     assert done[-1] == (fitting, fitting)
 
@@ -281,7 +281,7 @@ def test_what_no_tolerance_judges_and_what_cannot_be_simulated_is_said() -> None
     free = busplan.load_profile(SMALL, changes={"tolerance": {}})
     answer = busplan.map_(free, x={"bus.nodes": (2,)}, y=y, circle=True)
     assert [cell.state for cell in answer.cells] == ["circle not judged", "circle cannot be run"]
-    assert [cell.limited_by for cell in answer.cells] == [(), ("circle.feed_mm_per_min",)]
+    assert [cell.reasons for cell in answer.cells] == [(), ("circle.feed_mm_per_min",)]
     judged = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
     assert [cell.circle_passed is None for cell in judged.cells] == [False, True]
 

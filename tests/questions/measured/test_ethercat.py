@@ -37,7 +37,7 @@ OF_THE_EXAMPLE = Machine(devices=8, datagrams=((LRW, 0x10000, 160), (FRMW, 0, 8)
 """As ethercat-servo-8, but faster than planned."""
 PLAN = busplan.load_profile(
     "ethercat-servo-8",
-    changes={"bus.nodes": 4, "payload.read_bytes": 10, "payload.write_bytes": 10, "node.cable_m": 0},
+    changes={"bus.nodes": 4, "payload.read_bytes": 10, "payload.write_bytes": 10, "node.cable_length_m": 0},
 )
 
 
@@ -241,7 +241,7 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     assert answer.edits["node.delay_us"] == pytest.approx(0.736667)
     # The master's time is what the measured delays leave.
     assert answer.edits["bus.master_us"] == pytest.approx(30, abs=0.01)
-    exact = busplan.load_profile(PLAN, changes={"node.delay_us": 0.6, "node.cable_m": 10})
+    exact = busplan.load_profile(PLAN, changes={"node.delay_us": 0.6, "node.cable_length_m": 10})
     beside = of_packets(started + simulated(machine, 100), tmp_path, plan=exact)
     assert figure(beside, "delay of device 2").planned == pytest.approx(0.65)
     assert "mean delay of devices 2 to 4" in [figure.quantity for figure in beside.outside]

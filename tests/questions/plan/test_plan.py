@@ -169,7 +169,7 @@ def test_nothing_to_change(make: Make) -> None:
 
 def test_what_was_asked_for_is_kept_and_part_of_the_changes(make: Make) -> None:
     wanted = {"bus.nodes": 5, "bus.gap_count": 63, "cycle.period_us": 1000.0}
-    answer = busplan.plan(make(), wanted=wanted)
+    answer = busplan.plan(make(), changes=wanted)
     assert answer.wanted == {"bus.nodes": 5, "cycle.period_us": 1000.0}
     assert [freedom.name for freedom in answer.free] == ["slice_ratio"]
     assert answer.recommended is not None
@@ -183,7 +183,7 @@ def test_what_was_asked_for_is_kept_and_part_of_the_changes(make: Make) -> None:
 
 
 def test_an_unsafe_gap_count_is_never_recommended(make: Make) -> None:
-    assert busplan.plan(make(), gap_count=3).recommended is None
+    assert busplan.plan(make(), changes={"bus.gap_count": 3}).recommended is None
     assert busplan.plan(make(bus__gap_count=3)).recommended is not None
     # Nobody knows a safe one for cables that the table does not hold for.
     assert busplan.plan(make(bus__gap_count=3, bus__cable_length_m=10.0)).recommended is None

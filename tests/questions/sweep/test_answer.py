@@ -226,7 +226,7 @@ def test_what_makes_no_sweep_is_refused() -> None:
             {},
             "vary servo.drive_lag_us: no figure of capacity depends on it; add circle",
         ),
-        ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without force=True"),
+        ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without unlimited=True"),
         (
             {"circle.feed_mm_per_min": [1000.0, 500_000.0]},
             {"circle": True},

@@ -121,7 +121,7 @@ def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
     # The memory of one: they run one behind the other.
     assert " and 0.58 GB" in message
     # Of more points than are looked at, the number is that of all.
-    (message,) = announced({"delivery.seed": range(1, 1001)}, force=True)
+    (message,) = announced({"delivery.seed": range(1, 1001)}, unlimited=True)
     assert message.startswith("circle test: 50,267,120,000 steps, about ")
 
 

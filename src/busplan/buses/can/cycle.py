@@ -432,15 +432,13 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """The order of queues, what a bound adds up, and how often an error repeats a frame."""
+        """The order of queues, and how often an error repeats a frame."""
         bus, groups = self.network.profile.bus, self.network.groups
         orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
         known = sorted(order for order in orders if order is not None)
         queues = f"queues: {' and '.join(known)}" if known else ""
         if None in orders:
             queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
-        if self.traffic.has_cycle and self.traffic.access == "burst":
-            queues += "; no frame beside the slowest answer and the host's time, an upper bound"
         if is_off(self.traffic.error_burst):
             return queues, "no repeated frames"
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
@@ -500,6 +498,10 @@ class CanCycle(BusCycle):
             response = f"{_short(worst.us)} us of {_short(latest.deadline_us)}"
             words = response if worst.us < inf else "without a worst-case response time"
             lines.append(("latest message", f"{latest.name}, {words}"))
+        possible_us = plain(self.possible_us())
+        if possible_us:
+            why = "its frames may hide this" if self.traffic.access == "burst" else "the test of queues is sufficient"
+            lines.append(("upper bound", f"up to {_short(possible_us)} us less may do: {why}"))
         most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
         if most >= 0:
             kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"

@@ -23,7 +23,7 @@ from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, larger, plain, pointwise, smaller, total, within
+from busplan.elementwise import Number, choose, larger, plain, pointwise, smaller, total, within
 from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US
 
@@ -67,15 +67,19 @@ _ENDLESS: Final = 1e6
 
 
 def _deadline(network: Network) -> Number:
-    return _slowest(traffic_of(network).longest)
+    share = _slowest(traffic_of(network).longest)
+    return choose(share < _ENDLESS, share, inf)
 
 
 def _late_part(network: Network) -> Number:
     """Part of that which is only possible: what FD frames take in addition, and all that queues add to J + C [1]."""
     traffic = traffic_of(network)
+    if not traffic.queues and traffic.longest is traffic:
+        return 0.0
+    most, surely = _slowest(traffic.longest), _slowest(traffic)
     if traffic.queues:
-        return _deadline(network) - traffic.ask(_own_share, words="J + C over D of all messages")
-    return 0.0 if traffic.longest is traffic else _slowest(traffic.longest) - _slowest(traffic)
+        surely = traffic.ask(_own_share, words="J + C over D of all messages")
+    return choose(most < _ENDLESS, most - surely, choose(surely < _ENDLESS, inf, 0.0))
 
 
 def _own_share(traffic: Traffic) -> Number:
@@ -289,7 +293,8 @@ LIMITS: Final = (
         _assumed_periods,
         lambda _network: 0,
         perhaps=_assumed_periods,
-        way_out="known periods have room",
+        way_out="give message.NAME.period_us as it is known",
+        place="message",
     ),
     Limit(
         "senders",
@@ -298,6 +303,7 @@ LIMITS: Final = (
         lambda _network: 0,
         perhaps=lambda network: len(_unknown_senders(network)),
         way_out="give message.NAME.sender",
+        place="bus.queue",
     ),
     Limit(
         "deadline",

@@ -183,7 +183,9 @@ class EthercatCycle(BusCycle):
         bus = self.network.profile.bus
         values = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
         values |= {
-            group.key("cable_m"): group.node.cable_m for group in self.network.groups if group.node.port != "E-bus"
+            group.key("cable_length_m"): group.node.cable_length_m
+            for group in self.network.groups
+            if group.node.port != "E-bus"
         }
         return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in values.items() if not value)
 
@@ -205,7 +207,7 @@ class EthercatCycle(BusCycle):
         """The path of the last byte to each device and through it, and back."""
         way, device = [], 0
         for group in self.network.groups:
-            to_us, through_us = plain(cable_us(group.node.cable_m)) / 2, plain(hop_us(group)) / 2
+            to_us, through_us = plain(cable_us(group.node.cable_length_m)) / 2, plain(hop_us(group)) / 2
             for _ in range(int(plain(group.nodes))):
                 device += 1
                 way += [
@@ -278,7 +280,7 @@ class EthercatCycle(BusCycle):
         way_us, left = 0.0, node
         for group in network.groups:
             passed = min(left, int(plain(group.nodes)))
-            way_us += passed * plain(hop_us(group) + cable_us(group.node.cable_m)) / 2
+            way_us += passed * plain(hop_us(group) + cable_us(group.node.cable_length_m)) / 2
             left -= passed
         return sent_us + way_us
 

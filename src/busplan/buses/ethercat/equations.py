@@ -160,12 +160,12 @@ def sending_us(wire_bytes: Number) -> Number:
     return wire_bytes * BYTE_US
 
 
-def cable_us(cable_m: Number) -> Number:
+def cable_us(cable_length_m: Number) -> Number:
     """Time that a cable takes there and back [us].
 
     Parameters
     ----------
-    cable_m
+    cable_length_m
         Its length [m]; float or array.
 
     Examples
@@ -173,7 +173,7 @@ def cable_us(cable_m: Number) -> Number:
     >>> cable_us(100)
     1.0
     """
-    return _BOTH_WAYS * cable_m * CABLE_US_PER_M
+    return _BOTH_WAYS * cable_length_m * CABLE_US_PER_M
 
 
 def device_us(delay_us: Number) -> Number:

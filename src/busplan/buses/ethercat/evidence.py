@@ -17,9 +17,9 @@ def frame_bytes(_cycle: object, *, data_bytes: int) -> float:
     return plain(equations.frame_bytes(equations.datagram_bytes(data_bytes)))
 
 
-def on_the_wire_us(_cycle: object, *, wire_bytes: int, devices: int, cable_m: float) -> float:
+def on_the_wire_us(_cycle: object, *, wire_bytes: int, devices: int, cable_length_m: float) -> float:
     """Time of a frame through E-bus devices and back, each with a cable before it [us]."""
-    hop_us = plain(equations.device_us(DELAY_US["E-bus"])) + plain(equations.cable_us(cable_m))
+    hop_us = plain(equations.device_us(DELAY_US["E-bus"])) + plain(equations.cable_us(cable_length_m))
     return plain(equations.sending_us(wire_bytes)) + devices * hop_us
 
 

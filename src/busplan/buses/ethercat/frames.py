@@ -526,7 +526,7 @@ def devices_us(network: Network) -> Number:
 
 def cables_us(network: Network) -> Number:
     """Delay of all cables there and back [us]."""
-    return total(group.nodes * cable_us(group.node.cable_m) for group in network.groups)
+    return total(group.nodes * cable_us(group.node.cable_length_m) for group in network.groups)
 
 
 def devices_doubts(network: Network) -> Iterator[Doubt]:

@@ -143,10 +143,10 @@ LIMITS: Final = (
     Limit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
-        lambda network: reduce(larger, (group.node.cable_m for group in network.groups)),
+        lambda network: reduce(larger, (group.node.cable_length_m for group in network.groups)),
         lambda _network: MOST_CABLE_M,
         way_out="a device in between would do",
-        place="node.cable_m",
+        place="node.cable_length_m",
     ),
     SYNC0,
     SYNC_WINDOW,
@@ -217,7 +217,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
 # master_jitter_us = 20    # how late its frames may start: measure it under load; 0 is taken""",
         node="""\
 # port = "E-bus"           # of terminals on a backplane; 100BASE-TX is taken
-# cable_m = 10             # from the device before it; 0 is taken
+# cable_length_m = 10      # from the device before it; 0 is taken
 """,
         hosts={
             "hardware": _host(5, "a master in hardware or a kernel driver of its own: a few us"),
@@ -242,7 +242,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         "bus.sync_shift": Key("shift", SYNC_SHIFT, meaning="drives act, and sample, later"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
         "bus.distributed_clocks": Key(role="clock"),
-        "node.cable_m": Key("L", role="cable"),
+        "node.cable_length_m": Key("L", role="cable"),
         "node.delay_us": Key("t_d"),
         "node.execution.worst_extra_us": Key("T_extra"),
     }

@@ -189,4 +189,4 @@ def _planned_us(nodes: ProfileGroup) -> float:
 
 def _cable_us(nodes: ProfileGroup) -> float:
     """Cable to a device one way [us]."""
-    return plain(cable_us(nodes.node.cable_m)) / 2
+    return plain(cable_us(nodes.node.cable_length_m)) / 2

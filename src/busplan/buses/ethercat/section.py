@@ -132,7 +132,7 @@ class EthercatNode(NodeSection):
         description="Measured delay of the device one way, without cable; without it by the port [us]",
         examples=[0.7],
     )
-    cable_m: Annotated[float, Field(ge=0, le=_LONGEST_CABLE_M, allow_inf_nan=False)] = Field(
+    cable_length_m: Annotated[float, Field(ge=0, le=_LONGEST_CABLE_M, allow_inf_nan=False)] = Field(
         default=0.0, description="Cable from the device before it, or from the master [m]", examples=[2]
     )
     sync_window_us: Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)] | None = Field(

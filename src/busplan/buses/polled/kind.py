@@ -51,21 +51,21 @@ LIMITS: Final = (
         "nodes",
         "{value:.0f} nodes are over the {most:.0f} of a bus",
         lambda network: network.nodes,
-        lambda network: protocol_of(network.profile.bus).most_nodes,
+        lambda network: protocol_of(network.profile.bus).max_nodes,
         way_out="a second bus has room for more",
     ),
     Limit(
         "payload",
         "a telegram has {value:.0f} bytes of data, over {most:.0f}",
         _largest_bytes,
-        lambda network: protocol_of(network.profile.bus).most_bytes,
+        lambda network: protocol_of(network.profile.bus).max_bytes,
         way_out="a smaller payload would do",
     ),
     Limit(
         "range",
         "{value:g} kbit/s are over the {most:g} of the protocol",
         lambda network: network.profile.bus.bit_rate_kbit_s,
-        lambda network: protocol_of(network.profile.bus).most_kbit_s,
+        lambda network: protocol_of(network.profile.bus).max_bit_rate_kbit_s,
         way_out="a lower bit rate would do",
     ),
 )
@@ -191,7 +191,7 @@ class Polled(Bus):
 
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads of whole bytes that a telegram holds."""
-        return PayloadRange(1, int(protocol_of(network.profile.bus).most_bytes), carrier="a telegram")
+        return PayloadRange(1, int(protocol_of(network.profile.bus).max_bytes), carrier="a telegram")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Protocol, bit rate, and how nodes are asked."""

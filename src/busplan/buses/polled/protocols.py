@@ -48,14 +48,14 @@ class Protocol(Section):
     )
     silence_bits: BitTimes = Field(default=0.0, description="Silence that ends every telegram [bits]", examples=[38.5])
     silence_us: TimeUs = Field(default=0.0, description="Least of that silence [us]", examples=[1750])
-    least_turn_bits: BitTimes = Field(default=0.0, description="Shortest wait for an answer [bits]", examples=[10])
-    most_turn_bits: BitTimes = Field(default=0.0, description="Longest wait for an answer [bits]", examples=[70])
+    min_turn_bits: BitTimes = Field(default=0.0, description="Shortest wait for an answer [bits]", examples=[10])
+    max_turn_bits: BitTimes = Field(default=0.0, description="Longest wait for an answer [bits]", examples=[70])
     return_delay_us: TimeUs = Field(
         default=0.0, description="Delay of an answer that is set in a new node [us]", examples=[500]
     )
-    most_nodes: Count = Field(default=1_000_000, description="Most nodes of a bus", examples=[253])
-    most_bytes: Count = Field(default=1_000_000, description="Most data of a telegram [bytes]", examples=[249])
-    most_kbit_s: Annotated[float, Field(gt=0, le=1e9)] = Field(
+    max_nodes: Count = Field(default=1_000_000, description="Most nodes of a bus", examples=[253])
+    max_bytes: Count = Field(default=1_000_000, description="Most data of a telegram [bytes]", examples=[249])
+    max_bit_rate_kbit_s: Annotated[float, Field(gt=0, le=1e9)] = Field(
         default=1e9, description="Highest bit rate [kbit/s]", examples=[1000]
     )
 
@@ -119,8 +119,8 @@ def times(network: Network) -> Times:
         return _profibus(bus, bit_us)
     silence_us = larger(_bits_us(protocol.silence_bits, bit_us), protocol.silence_us)
     delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
-    most_bits = protocol.most_turn_bits if bus.max_turn_bits is None else bus.max_turn_bits
-    shortest_us = silence_us + _bits_us(protocol.least_turn_bits, bit_us) + delay_us
+    most_bits = protocol.max_turn_bits if bus.max_turn_bits is None else bus.max_turn_bits
+    shortest_us = silence_us + _bits_us(protocol.min_turn_bits, bit_us) + delay_us
     longest_us = shortest_us
     if not is_off(most_bits):
         longest_us = larger(silence_us + most_bits * bit_us + delay_us, shortest_us)

@@ -181,7 +181,7 @@ def _verdict(verdict: Verdict) -> Record:
         **fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": verdict.network.profile.limits.reserve,
-        "not_in_it": [part.key for part in verdict.left_out],
+        "not_in_uncertainty": [part.key for part in verdict.left_out],
         "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
         "cheapest_change": change and _change_record(change),
         "setting_change": verdict.setting and _change_record(verdict.setting),

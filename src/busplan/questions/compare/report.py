@@ -85,7 +85,7 @@ def compare_report(answer: CompareAnswer) -> Report:
             period_us=answer.profile.cycle.period_us,
             nodes=int(plain(answer.network.nodes)),
             axes=int(plain(answer.network.axes)),
-            counted_group=answer.counted or None,
+            group=answer.counted or None,
             buses=records,
         ),
         with_profile(answer.profile.name, [_row_of_lists(record) for record in records]),

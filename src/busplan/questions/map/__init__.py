@@ -75,7 +75,7 @@ class Cell(NamedTuple):
     nodes: int
     axes: int
     state: State
-    limited_by: tuple[str, ...]
+    reasons: tuple[str, ...]
     """Limits that are broken, or not shown to be kept; of a circle, its failures or the keys that prevent its run;
     empty if the cell fits."""
     binding_term: str | None
@@ -104,7 +104,7 @@ class Region(NamedTuple):
     """All cells of one state with one limit."""
 
     state: State
-    limited_by: tuple[str, ...]
+    reasons: tuple[str, ...]
     binding_term: str | None
     """The largest term of the cycle, where time is the limit."""
     cells: int
@@ -163,8 +163,7 @@ class MapAnswer(OfNetwork, Answer):
     def regions(self) -> tuple[Region, ...]:
         """Cells by state and limit: states in the order of `STATES`, the largest region of each first."""
         counts = Counter(
-            (cell.state, cell.limited_by, cell.binding_term if cell.limited_by == (TIME,) else None)
-            for cell in self.cells
+            (cell.state, cell.reasons, cell.binding_term if cell.reasons == (TIME,) else None) for cell in self.cells
         )
         regions = [Region(*region, cells=number) for region, number in counts.items()]
         return tuple(sorted(regions, key=lambda region: (STATES.index(region.state), -region.cells)))
@@ -419,7 +418,7 @@ def _cell(network: Network, *, x: Value, y: Value) -> Cell:
         nodes=fit.nodes,
         axes=fit.axes,
         state=state,
-        limited_by=limits,
+        reasons=limits,
         binding_term=fit.binding_term,
         verdict=verdict,
         margin_corrected_us=fit.margin_corrected_us,
@@ -454,7 +453,7 @@ def _with_circles(
     run = [place for place in settings if place not in refused]
     results = run_points(profile, [settings[place].changes for place in run], executor=executor, progress=progress)
     return {
-        **{place: cells[place]._replace(state="circle cannot be run", limited_by=refused[place]) for place in refused},
+        **{place: cells[place]._replace(state="circle cannot be run", reasons=refused[place]) for place in refused},
         **{place: _judged(cells[place], result) for place, result in zip(run, results, strict=True)},
     }
 
@@ -462,5 +461,5 @@ def _with_circles(
 def _judged(cell: Cell, result: CircleFigures) -> Cell:
     cell = cell._replace(circle_passed=result.passed, max_contour_error_mm=result.max_contour_error_mm)
     if result.passed is False:
-        return cell._replace(state="circle fails", limited_by=tuple(failure.name for failure in result.failures))
+        return cell._replace(state="circle fails", reasons=tuple(failure.name for failure in result.failures))
     return cell if result.passed else cell._replace(state="circle not judged")

@@ -128,7 +128,7 @@ _Looks = Mapping[tuple[State, tuple[str, ...]], Look]
 
 def _looks(answer: MapAnswer) -> _Looks:
     """The look of each region: that of its state, with a letter for each limit where no period helps."""
-    looks = {(region.state, region.limited_by): LOOKS[region.state] for region in answer.regions}
+    looks = {(region.state, region.reasons): LOOKS[region.state] for region in answer.regions}
     barred = [limits for state, limits in looks if state == "does not fit" and limits != (TIME,)]
     marks = zip(barred, letters(map("".join, barred)), strict=True)
     return looks | {("does not fit", limits): _BARRED._replace(mark=mark) for limits, mark in marks}
@@ -171,7 +171,7 @@ def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> D
 def _cell(answer: MapAnswer, cell: Cell | NotDrawn, looks: _Looks) -> ChartCell | None:
     if isinstance(cell, NotDrawn):
         return None
-    look = looks[cell.state, cell.limited_by]
+    look = looks[cell.state, cell.reasons]
     return ChartCell(look.ink, look.mark, f"{_setting_words(answer, cell)}: {_verdict_words(answer, cell)}", look.tone)
 
 
@@ -184,7 +184,7 @@ def _regions_table(answer: MapAnswer, looks: _Looks) -> Table:
     )
     rows = []
     for region in answer.regions:
-        look = looks[region.state, region.limited_by]
+        look = looks[region.state, region.reasons]
         state = Swatch(look.ink, look.mark, _state_words(answer, region.state))
         rows.append(TableRow((state, _limit_words(answer, region), count_value(region.cells, "cells"))))
     return Table(columns, tuple(rows), Sentence(("What limits each region",)))
@@ -194,7 +194,7 @@ def circle_words(answer: MapAnswer, cell: Cell) -> Sentence | None:
     """Result of the circle test of a cell; None if none was asked for, or the cell does not fit."""
     if not answer.with_circle or cell.verdict != FITS or cell.state == "unsafe":
         return None
-    words = ", ".join(("passes" if cell.state == FITS else cell.state.removeprefix("circle "), *cell.limited_by))
+    words = ", ".join(("passes" if cell.state == FITS else cell.state.removeprefix("circle "), *cell.reasons))
     if cell.max_contour_error_mm is None:
         return Sentence((words,), LOOKS[cell.state].tone)
     error = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], cell)
@@ -223,8 +223,8 @@ def _state_words(answer: MapAnswer, state: State) -> str:
 
 def _limit_words(answer: MapAnswer, region: Region | Cell) -> str:
     """Limits that keep a region from fitting; empty where it fits."""
-    words = " and ".join(region.limited_by)
-    if region.limited_by != (TIME,):
+    words = " and ".join(region.reasons)
+    if region.reasons != (TIME,):
         return words
     return f"{words}, largest term {answer.network.bus.figures.term_label(region.binding_term)}"
 
@@ -275,7 +275,7 @@ def _record(answer: MapAnswer, cell: Cell) -> Record:
     return {
         answer.x.key: cell.x,
         answer.y.key: cell.y,
-        **fields(cell, "nodes", "axes", "state", "limited_by", "binding_term", "verdict"),
+        **fields(cell, "nodes", "axes", "state", "reasons", "binding_term", "verdict"),
         **fields(cell, "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),
         **fields(cell, "circle_passed", "max_contour_error_mm"),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
@@ -148,9 +148,7 @@ def plan(
     nodes: int | None = None,
     axes: int | None = None,
     period_us: float | None = None,
-    gap_count: int | Literal["optimal"] | None = None,
-    reserve: float | None = None,
-    wanted: Mapping[str, object] | KeyChanges | None = None,
+    changes: Mapping[str, object] | KeyChanges | None = None,
     free: Iterable[str] | None = None,
 ) -> PlanAnswer:
     """Tell what to set, with all changes together, for a number of nodes or axes.
@@ -165,11 +163,7 @@ def plan(
         Goal: number of axes, on as few nodes as they need [1]; instead of `nodes`.
     period_us
         Communication period T_s to keep [us].
-    gap_count
-        Gap count to keep, 0 to 63, or "optimal" [1].
-    reserve
-        Share of the slice that must stay free, 0..0.99, instead of the profile's limits.reserve [1].
-    wanted
+    changes
         Other values to keep by dotted key, in the key's unit: {"payload.read_bytes": 16}. `KeyChanges` have options
         besides, which errors name.
     free
@@ -209,15 +203,13 @@ def plan(
     given = {
         "bus.nodes": nodes,
         "cycle.period_us": None if period_us is None else finite(period_us, name="period_us"),
-        "bus.gap_count": gap_count,
-        "limits.reserve": None if reserve is None else finite(reserve, name="reserve"),
     }
     kept = _changes({key: from_numpy(value) for key, value in given.items() if value is not None})
-    kept += wanted.entries if isinstance(wanted, KeyChanges) else _changes(values_by_key(wanted, name="wanted"))
+    kept += changes.entries if isinstance(changes, KeyChanges) else _changes(values_by_key(changes, name="changes"))
     if axes is not None:
         kept = (_nodes(loaded, whole(axes, name="axes"), kept), *kept)
-    changes, names = KeyChanges(kept), None if free is None else [str(name) for name in items(free, name="free")]
-    return _plan(loaded, changes, names)
+    names = None if free is None else [str(name) for name in items(free, name="free")]
+    return _plan(loaded, KeyChanges(kept), names)
 
 
 def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> PlanAnswer:

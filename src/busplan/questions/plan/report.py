@@ -57,7 +57,7 @@ def plan_report(plan: PlanAnswer) -> Report:
             free=[freedom.name for freedom in plan.free],
             period_is_kept=plan.period_is_kept,
             recommended_changes=plan.recommended_changes,
-            binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
+            binding=None if plan.binding is None else {"constraint": plan.binding.key, "reason": plan.binding.why},
             relaxations=[vars(relaxation) for relaxation in plan.relaxations],
             options=records,
         ),

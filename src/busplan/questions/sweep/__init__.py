@@ -267,7 +267,7 @@ def sweep(
     group: str | None = None,
     circle: bool = False,
     summary: bool = False,
-    force: bool = False,
+    unlimited: bool = False,
     executor: Executor | None = None,
     progress: Progress = ignored,
 ) -> SweepAnswer:
@@ -291,7 +291,7 @@ def sweep(
     summary
         With `circle` and values of delivery.seed: a row for each point of the other keys, with mean, sample standard
         deviation, 95 % quantile and worst of each figure of the circle over the seeds, and the share that failed.
-    force
+    unlimited
         Allow more than 1,000 circle tests.
     executor
         With `circle`: where the tests run, in chunks of about a second; by default in this thread. Any
@@ -333,7 +333,7 @@ def sweep(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
     checked = checked_sweep(
-        network, vary, timing_models=models, group=group, circle=circle, summary=summary, force=force
+        network, vary, timing_models=models, group=group, circle=circle, summary=summary, unlimited=unlimited
     )
     return computed(checked, executor=executor, progress=progress)
 

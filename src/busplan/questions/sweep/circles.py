@@ -36,7 +36,7 @@ CIRCLE_COLUMNS: Final = (
 )
 """Columns of circle tests, named as in `circle-test`."""
 MOST_CIRCLES_UNASKED: Final = 1000
-"""Most circle tests without force=True: minutes compiled, an hour in plain Python."""
+"""Most circle tests without unlimited=True: minutes compiled, an hour in plain Python."""
 _ESTIMATED: Final = 100
 """Most points whose cost is estimated: that of others is like it."""
 _CHUNK_S: Final = 1.5
@@ -189,7 +189,7 @@ def require_few(grid: Grid, *, seeds: int) -> None:
         many = f"{grid.points:,} points" if seeds == 1 else f"{grid.points:,} points with {seeds:,} seeds each"
         raise BusplanError(
             f"circle=True: {many} are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run without "
-            "force=True; vary less, or give it"
+            "unlimited=True; vary less, or give it"
         )
 
 

@@ -191,7 +191,7 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
     if any(other.startswith(f"{key}.") for other in keys):
         raise BusplanError(f"{name}: is a section; expected the key of one number")
     if key not in keys:
-        override(profile, {key: 0}, origin={key: name})  # says what was meant
+        override(profile, {key: 1}, origin={key: name})  # says what was meant
         raise BusplanError(f"{name}: no such key of this profile")
     if isinstance(keys[key].value, list | tuple):
         raise BusplanError(f"{name}: is a list; expected the key of one number")

@@ -122,7 +122,7 @@ def checked_sweep(
     group: str | None,
     circle: bool,
     summary: bool,
-    force: bool,
+    unlimited: bool,
     changes: KeyChanges = NO_CHANGES,
 ) -> Sweep:
     """Check the options of a sweep.
@@ -137,7 +137,7 @@ def checked_sweep(
         Names of timing models; by default all that can express every value.
     group
         Name of the group whose nodes vary for the most nodes and axes; by default that with the most axes.
-    circle, summary, force
+    circle, summary, unlimited
         Run circle tests, summarise them over seeds, and run any number of them.
     changes
         The changes of the profile, for the answer to name them.
@@ -159,7 +159,7 @@ def checked_sweep(
     grid, seeds = without_seed(grid) if summary else (grid, None)
     models = grid_models(network, grid, timing_models)
     varied = group or (varied_nodes(profile).name if names else "")
-    if circle and not force:
+    if circle and not unlimited:
         require_few(grid, seeds=1 if seeds is None else seeds.size)
     return Sweep(network, grid, models, varied, circle, seeds, changes)
 
