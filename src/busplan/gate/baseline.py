@@ -181,14 +181,14 @@ def read_baseline(text: str, *, name: str) -> Baseline:
         raise BusplanError(f"{name}: no JSON, so no baseline; {_REMEDY}") from None
     if not isinstance(document, dict) or document.get("command") != "baseline" or document.get("schema") != _SCHEMA:
         raise BusplanError(f"{name}: no baseline of this version; {_REMEDY}")
-    profiles = document.get("profiles")
-    if not isinstance(profiles, dict) or not all(map(_are_figures, profiles.values())):
-        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
-    models, keys = document.get("models", 1), document.get("keys", {})
-    if not isinstance(models, int) or isinstance(models, bool) or not _are_keys(keys):
-        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
-    known = document.get("findings", {})
-    if not isinstance(known, dict) or not all(_are_words(names) for names in known.values()):
+    profiles, models = document.get("profiles"), document.get("models", 1)
+    keys, known = document.get("keys", {}), document.get("findings", {})
+    if not (
+        (isinstance(profiles, dict) and all(map(_are_figures, profiles.values())))
+        and (isinstance(keys, dict) and all(map(_are_values, keys.values())))
+        and (isinstance(known, dict) and all(map(_are_words, known.values())))
+        and (isinstance(models, int) and not isinstance(models, bool))
+    ):
         raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
     records = {path: Record(each, keys.get(path), tuple(known.get(path, ()))) for path, each in profiles.items()}
     return Baseline(records, models)
@@ -198,10 +198,8 @@ def _are_words(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(word, str) for word in value)
 
 
-def _are_keys(value: object) -> bool:
-    return isinstance(value, dict) and all(
-        isinstance(table, dict) and all(map(_is_value, table.values())) for table in value.values()
-    )
+def _are_values(value: object) -> bool:
+    return isinstance(value, dict) and all(map(_is_value, value.values()))
 
 
 def _is_value(value: object) -> bool:

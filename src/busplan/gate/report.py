@@ -15,7 +15,7 @@ from busplan import __version__
 from busplan.buses.rule import Rule, Severity, told_apart
 from busplan.english import nouns, plural, printable, printable_lines, to_json
 from busplan.forms import markdown, terminal
-from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
+from busplan.forms.blocks import Code, JsonDocument, Report, Sentence, State, count_value, joined, sentence
 from busplan.forms.lines import BLANK, Line, Mark, Tone, plain_text, styled_text
 from busplan.forms.markdown import code, escaped, table
 from busplan.forms.numbers import MISSING, sentence_text
@@ -116,7 +116,7 @@ def check_report(report: CheckReport) -> Report:
         Sentence(("Check of profiles",)),
         tuple(_sentences(report)),
         check_document(report),
-        check_records(report),
+        [{"path": located.path, **located.finding._asdict()} for located in report.located],
     )
 
 
@@ -156,11 +156,6 @@ def _state(report: CheckReport) -> State:
     if report.failed or report.has_findings("error"):
         return "fails"
     return "warns" if report.has_findings("warning") else "passes"
-
-
-def check_records(report: CheckReport) -> list[Record]:
-    """One row for each finding."""
-    return [{"path": located.path, **located.finding._asdict()} for located in report.located]
 
 
 def check_document(report: CheckReport) -> JsonDocument:

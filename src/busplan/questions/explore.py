@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, prod
 from typing import Final
 
 from busplan.buses.limits import Value
@@ -192,12 +192,10 @@ def _is_possible(network: Network, key: str, value: Value) -> bool:
 def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
     """Refuse a grid that is too large for a page."""
     sizes = {along.key: len(along.values) for along in (x, y, third) if along is not None}
-    settings = 1
     for key, size in sizes.items():
-        settings *= size
         if size > MOST_VALUES:
             raise BusplanError(f"{key}: {size} values; a slider has up to {MOST_VALUES}. A map or a sweep takes more")
-    if settings > MOST_SETTINGS:
+    if (settings := prod(sizes.values())) > MOST_SETTINGS:
         raise BusplanError(f"{settings:,} settings; an explorer has up to {MOST_SETTINGS:,}: give fewer values")
 
 

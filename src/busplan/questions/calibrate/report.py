@@ -21,7 +21,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import sentence_text
 from busplan.profile.edit import value_text
-from busplan.questions.base.sentences import document, with_profile
+from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.calibrate import REPETITIONS_TO_COMPARE, CalibrateAnswer, Outlier
 from busplan.sections.base import TRANSACTION_KINDS
 
@@ -65,17 +65,14 @@ def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Re
         document(
             "calibrate",
             profile=name,
-            source=answer.source,
-            timing_model=answer.timing_model,
+            **fields(answer, "source", "timing_model"),
             nodes=network.nodes,
             **{key: figures[key] for key in network.bus.figures.headings},
             measurements=answer.measurements,
             execution=answer.section,
-            uncertainty_us=answer.uncertainty_us,
-            at_most_us=answer.at_most_us,
+            **fields(answer, "uncertainty_us", "at_most_us"),
             outliers=[outlier._asdict() for outlier in answer.outliers],
-            worst_extra_us=answer.worst_extra_us,
-            unchecked_bytes=list(answer.unchecked_bytes),
+            **fields(answer, "worst_extra_us", "unchecked_bytes"),
             payloads=payloads,
             warnings=[sentence_text(warning) for warning in warned],
             applied_to=applied_to,

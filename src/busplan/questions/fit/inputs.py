@@ -1,6 +1,6 @@
 """Keys of a profile as inputs of a derivation with grade and source, and the assumptions that a verdict rests on."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -209,7 +209,10 @@ def _execution_shares(figures: RuleFigures, network: Network, variance: float) -
         return []
     without = network._replace(groups=tuple(at_once(group) if group in assumed else group for group in network.groups))
     cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(group.key(_EXECUTION) for group in assumed)
-    whole_us, rest_us = (_execution_uncertainty_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
+    whole_us, rest_us = (
+        sum(float(doubt.us) for doubt in doubts if doubt.key.endswith(f".{_EXECUTION}"))
+        for doubts in (figures.doubts, cycle.doubts())
+    )
     rest = {term.key: plain(term.us) for term in cycle.terms}
     # A term that grows without execution times, such as the wait for a gap, is not due to them.
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
@@ -232,8 +235,3 @@ def _rate_shares(figures: RuleFigures, network: Network) -> Iterator[_Share]:
             yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
             yield (key,), 1 - plain(load.value(unlimited)) / plain(load.value(network)), "the load"
-
-
-def _execution_uncertainty_us(doubts: Sequence[Any]) -> float:
-    """Standard uncertainty of a cycle by all execution times together [us]."""
-    return sum(float(doubt.us) for doubt in doubts if doubt.key.endswith(f".{_EXECUTION}"))
