@@ -186,3 +186,19 @@ def test_a_load_kept_by_exact_clocks_alone_is_not_shown() -> None:
     for share, verdict in ((0.0, "fits"), (0.005, "fits"), (0.0158, "not shown to fit")):
         changes = {"bus.clock_tolerance": share, "limits.max_load": 1.01 * load}
         assert figures(busplan.load_profile("can-servo-8", changes=changes)).verdict == verdict
+
+
+def test_the_period_that_keeps_a_load_counts_slow_oscillators() -> None:
+    exact, slow = (
+        figures(busplan.load_profile("can-servo-8", changes={"bus.clock_tolerance": share, "limits.max_load": 0.3}))
+        for share in (0.0, 0.01)
+    )
+    assert slow.safe_min_period_us > 1.01 * exact.safe_min_period_us
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.0, 3), (0.0158, 2)])
+def test_so_does_the_margin_in_repeated_frames(share: float, kept: int) -> None:
+    changes = {"bus.clock_tolerance": share, "message.sdo-response.deadline_us": 5000}
+    (card,) = busplan.capacity(busplan.load_profile("can-servo-8", changes=changes)).to_dict()["verdicts"]
+    (words,) = (line["text"] for line in card["lines"] if line["label"] == "repeated frames")
+    assert words == f"up to {kept} in a row keep every deadline, one more makes sdo-response late"
