@@ -197,8 +197,11 @@ def number(schema: dict[str, Any]) -> str:
     whole = "whole " if schema["type"] == "integer" else ""
     if schema.get("minimum", 0) <= -MOST:
         return f"{whole}number"
-    least = f"> {schema['exclusiveMinimum']:g}" if "exclusiveMinimum" in schema else f"{schema['minimum']:g}"
-    return f"{whole}{least} " + (f"to {schema['maximum']:g}" if schema["maximum"] < MOST else "or more")
+    is_open = schema["maximum"] >= MOST
+    if "exclusiveMinimum" in schema:
+        least = f"over {schema['exclusiveMinimum']:g}"
+        return f"{whole}{least}" if is_open else f"{whole}{least}, to {schema['maximum']:g}"
+    return f"{whole}{schema['minimum']:g} " + ("or more" if is_open else f"to {schema['maximum']:g}")
 
 
 SHOWN_FIRST = "ieee1394"
