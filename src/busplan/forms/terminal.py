@@ -43,7 +43,7 @@ def _card_lines(card: Card, width: int | None) -> list[Line]:
     lines = [*_head(card, room), *([_bar(card.gauge, room)] if card.gauge else [])]
     for label, words in card.lines:
         line = sentence_line(words)
-        before = f"{_CARD_INDENT}{label:<{_LABEL - len(_CARD_INDENT)}}"
+        before = f"{_CARD_INDENT}{label:<{_LABEL - len(_CARD_INDENT) - 1}} "
         marks = tuple(Mark(mark.start + len(before), mark.end + len(before), mark.tone) for mark in line.marks)
         lines += wrapped(Line(f"{before}{line.text}", line.tone, marks), room if width else None, hang=_LABEL)
     return lines

@@ -375,9 +375,15 @@ class CanProfile(Profile):
         keys += (f"{name}.queue" for name, part in sections.items() if getattr(part, "queue", None) in NOT_BY_PRIORITY)
         if (self.servo.loop, self.servo.update) == ("host", "next_sync"):
             keys.append("servo.update")
-        why = f'asks for SYNC, and bus.access = "{bus.access}" has none'
-        more = {"queue": "; say priority", "update": "; say on_arrival"}
-        yield from (Problem(f"{why}{more.get(key.split('.')[-1], '; remove it')}", key, "inconsistent") for key in keys)
+        none = f'and bus.access = "{bus.access}" has none'
+        words = {
+            "queue": f"is computed with SYNC alone, {none}; say priority",
+            "update": f"asks for SYNC, {none}; say on_arrival",
+        }
+        yield from (
+            Problem(words.get(key.split(".")[-1], f"asks for SYNC, {none}; remove it"), key, "inconsistent")
+            for key in keys
+        )
         for section, nodes in zip(names, self.node_groups, strict=True):
             for kind in TRANSACTION_KINDS:
                 if nodes.bytes_of(kind) <= 0:
