@@ -93,8 +93,13 @@ def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority() ->
     [
         ({}, "priority queues: assumed"),
         ({"bus__queue": "priority"}, "queues: priority"),
-        ({"node__queue": "fifo"}, "queues: fifo, others by priority: assumed"),
-        ({"bus__queue": "priority", "node__queue": "single-buffer"}, "queues: priority and single-buffer"),
+        ({"node__queue": "fifo"}, "queues: fifo (senders host, node), others by priority: assumed"),
+        # A sender that is misspelt stands there.
+        (
+            {"bus__queue": "single-buffer", "message__sdo-request__sender": "hots"},
+            "queues: single-buffer (senders hots, node)",
+        ),
+        ({"bus__queue": "priority", "node__queue": "single-buffer"}, "queues: priority and single-buffer (senders host, node)"),
     ],
 )
 def test_the_card_says_what_is_known_of_queues(changes: dict[str, Any], words: str) -> None:

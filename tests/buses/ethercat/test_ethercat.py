@@ -279,7 +279,7 @@ def test_each_drive_has_its_own_window_about_sync0() -> None:
     assert unknown["verdict"] == "not shown to fit"
     assert unknown["limit"] == (
         "narrow: frames move 0.0 us against SYNC0 without the jitter, which is not given, and a drive allows 50 us: "
-        "a jitter of 50.0 us is allowed"
+        "a jitter of 50 us is allowed"
     )
     assert card(50, 70)["verdict"] == "does not fit"
     assert card(50, 70, clocks=False)["verdict"] == "fits"
@@ -305,7 +305,7 @@ def test_the_gate_sends_a_window_to_the_jitter_and_not_to_the_period(run: Any, t
         said = run("check", "--no-circle", str(path)).stdout
         assert f"{code} error: bus.master_jitter_us: " in said
         assert words in said
-        assert "a jitter of 50.0 us is allowed" in said
+        assert "a jitter of 50 us is allowed" in said
 
 
 def test_the_smallest_period_keeps_commands_before_sync0() -> None:

@@ -12,6 +12,7 @@ from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, MOST_REPEAT
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
+    NOT_BY_PRIORITY,
     REPEATED,
     SYNC,
     Message,
@@ -56,6 +57,7 @@ from busplan.elementwise import (
     value_of,
     within,
 )
+from busplan.english import first_of
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
@@ -437,6 +439,9 @@ class CanCycle(BusCycle):
         orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
         known = sorted(order for order in orders if order is not None)
         queues = f"queues: {' and '.join(known)}" if known else ""
+        if any(order in NOT_BY_PRIORITY for order in known):
+            senders = dict.fromkeys(message.sender for message in self.network.profile.message if message.sender)
+            queues += f" (senders {first_of(list(senders), 8)})" if senders else ""
         if None in orders:
             queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
         if is_off(self.traffic.error_burst):

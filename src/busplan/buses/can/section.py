@@ -377,7 +377,7 @@ class CanProfile(Profile):
             keys.append("servo.update")
         none = f'and bus.access = "{bus.access}" has none'
         words = {
-            "queue": f"is computed with SYNC alone, {none}; say priority",
+            "queue": f"is computed with SYNC alone, {none}; remove it, and by priority is assumed",
             "update": f"asks for SYNC, {none}; say on_arrival",
         }
         yield from (

@@ -116,7 +116,7 @@ def _window_words(network: Network) -> str:
     of_group = f"{group.name}: " if group.name else ""
     without = "" if jitter_us else " without the jitter, which is not given"
     left_us = most_us - us + jitter_us
-    allowed = f"a jitter of {left_us:.1f} us is allowed" if left_us > 0 else "no jitter is small enough"
+    allowed = f"a jitter of {left_us:.4g} us is allowed" if left_us > 0 else "no jitter is small enough"
     return f"{of_group}frames move {us:.1f} us against SYNC0{without}, and a drive allows {most_us:g} us: {allowed}"
 
 
