@@ -99,7 +99,10 @@ def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority() ->
             {"bus__queue": "single-buffer", "message__sdo-request__sender": "hots"},
             "queues: single-buffer (senders hots, node)",
         ),
-        ({"bus__queue": "priority", "node__queue": "single-buffer"}, "queues: priority and single-buffer (senders host, node)"),
+        (
+            {"bus__queue": "priority", "node__queue": "single-buffer"},
+            "queues: priority and single-buffer (senders host, node)",
+        ),
     ],
 )
 def test_the_card_says_what_is_known_of_queues(changes: dict[str, Any], words: str) -> None:
