@@ -80,10 +80,11 @@ def test_a_cycle_too_long_by_the_queues_alone_is_not_shown() -> None:
     assert (found.verdict, found.required_us > 3500) == ("not shown to fit", True)
 
 
-def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority() -> None:
-    known = network({"sender": "a"}, {"sender": "b"}, queue="fifo")
+@pytest.mark.parametrize("order", ["fifo", "single-buffer"])
+def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority(order: str) -> None:
+    known = network({"sender": "a"}, {"sender": "b"}, queue=order)
     assert figures(known).verdict == "fits"
-    unknown = network({"sender": "a"}, {}, queue="fifo")
+    unknown = network({"sender": "a"}, {}, queue=order)
     assert figures(unknown).verdict == "not shown to fit"
     assert "m1: who sends it is not known" in str(busplan.capacity(unknown).to_dict()["verdicts"][0]["lines"])
 
