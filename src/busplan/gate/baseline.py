@@ -5,10 +5,10 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import chain
-from math import isfinite
 from pathlib import Path
-from sys import float_info
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
+
+from pydantic import BaseModel, Field, ValidationError
 
 from busplan.buses import kind_named, kind_names
 from busplan.buses.figure import (
@@ -86,6 +86,19 @@ def keys_of(profile: Profile) -> dict[str, object]:
 def _loads(kind: str) -> Iterable[Figure]:
     """Figures of a kind of bus that are worse when larger, such as the load."""
     return (figure for figure in kind_named(kind).figures.compared if figure.better == "less")
+
+
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Scalar = bool | str | int | _Finite
+
+
+class _File(BaseModel, strict=True):
+    """A baseline as its file has it: figures, values of keys and findings of each profile."""
+
+    profiles: dict[str, dict[str, _Finite]]
+    models: int = 1
+    keys: dict[str, dict[str, _Scalar | list[_Scalar]]] = {}
+    findings: dict[str, list[str]] = {}
 
 
 class Baseline(NamedTuple):
@@ -181,40 +194,15 @@ def read_baseline(text: str, *, name: str) -> Baseline:
         raise BusplanError(f"{name}: no JSON, so no baseline; {_REMEDY}") from None
     if not isinstance(document, dict) or document.get("command") != "baseline" or document.get("schema") != _SCHEMA:
         raise BusplanError(f"{name}: no baseline of this version; {_REMEDY}")
-    profiles, models = document.get("profiles"), document.get("models", 1)
-    keys, known = document.get("keys", {}), document.get("findings", {})
-    if not (
-        (isinstance(profiles, dict) and all(map(_are_figures, profiles.values())))
-        and (isinstance(keys, dict) and all(map(_are_values, keys.values())))
-        and (isinstance(known, dict) and all(map(_are_words, known.values())))
-        and (isinstance(models, int) and not isinstance(models, bool))
-    ):
-        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
-    records = {path: Record(each, keys.get(path), tuple(known.get(path, ()))) for path, each in profiles.items()}
-    return Baseline(records, models)
-
-
-def _are_words(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(word, str) for word in value)
-
-
-def _are_values(value: object) -> bool:
-    return isinstance(value, dict) and all(map(_is_value, value.values()))
-
-
-def _is_value(value: object) -> bool:
-    """Whether a value may be that of a key: a scalar or an array of scalars."""
-    return all(
-        isinstance(scalar, bool | str | int) or (isinstance(scalar, float) and isfinite(scalar))
-        for scalar in (value if isinstance(value, list) else [value])
-    )
-
-
-def _are_figures(value: object) -> bool:
-    return isinstance(value, dict) and all(
-        isinstance(figure, int | float) and not isinstance(figure, bool) and abs(figure) <= float_info.max
-        for figure in value.values()
-    )
+    try:
+        file = _File.model_validate(document)
+    except ValidationError:
+        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}") from None
+    records = {
+        path: Record(figures, file.keys.get(path), tuple(file.findings.get(path, ())))
+        for path, figures in file.profiles.items()
+    }
+    return Baseline(records, file.models)
 
 
 def write_baseline(recorded: Mapping[str, Record]) -> str:
