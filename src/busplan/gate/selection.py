@@ -1,10 +1,12 @@
 """Which rules of the gate count where, and the settings of the nearest busplan.toml or pyproject.toml."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path, PurePath
-from typing import Any, Final, NamedTuple, NoReturn
+from typing import Annotated, Any, Final, Literal, NamedTuple, NoReturn
+
+from pydantic import BaseModel, Field, ValidationError
 
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError
@@ -13,7 +15,6 @@ from busplan.profile.document import Document, decode, read_bytes
 from busplan.profile.sources import SETTINGS_FILE
 
 _PYPROJECT: Final = "pyproject.toml"
-Refuse = Callable[[str], NoReturn]
 
 
 class Selection(NamedTuple):
@@ -105,41 +106,28 @@ class Settings(NamedTuple):
         return _relative(self.folder / written, Path.cwd())
 
 
-def _codes(value: Any, refuse: Refuse) -> tuple[str, ...]:
-    if not isinstance(value, list) or not all(isinstance(start, str) for start in value):
-        refuse('expected a list of rule codes or their beginnings, as ["BP112", "BP3"]')
-    return tuple(value)
+_Codes = Annotated[list[str], Field(description='a list of rule codes or their beginnings, as ["BP112", "BP3"]')]
 
 
-def _codes_by_pattern(value: Any, refuse: Refuse) -> dict[str, tuple[str, ...]]:
-    if not isinstance(value, dict):
-        refuse('expected lists of rule codes by pattern of the path, as {"old/*.toml" = ["BP112"]}')
-    return {pattern: _codes(starts, refuse) for pattern, starts in value.items()}
+class _Table(BaseModel, strict=True, extra="forbid", alias_generator=lambda name: name.replace("_", "-")):
+    """Settings as a file has them, by the name of their option; a description says what is expected."""
+
+    select: _Codes = []
+    ignore: _Codes = []
+    per_file_ignores: Annotated[
+        dict[str, list[str]],
+        Field(description='lists of rule codes by pattern of the path, as {"old/*.toml" = ["BP112"]}'),
+    ] = {}
+    fail_on: Annotated[Literal["error", "warning"], Field(description='"error" or "warning"')] = "error"
+    baseline: Annotated[str, Field(description="a path")] = ""
+    circle: Annotated[bool, Field(description="true or false")] = True
+    circle_steps: Annotated[int, Field(description="a whole number")] = 0
+    skip_others: Annotated[bool, Field(description="true or false")] = False
+    jobs: Annotated[int, Field(description="a whole number")] = 0
 
 
-def _of_type(kind: type, words: str) -> Callable[[Any, Refuse], Any]:
-    def checked(value: Any, refuse: Refuse) -> Any:
-        return value if type(value) is kind else refuse(f"expected {words}")
-
-    return checked
-
-
-def _severity(value: Any, refuse: Refuse) -> str:
-    return str(value) if value in ("error", "warning") else refuse('expected "error" or "warning"')
-
-
-_CHECKS: Final[Mapping[str, Callable[[Any, Refuse], Any]]] = {
-    "select": _codes,
-    "ignore": _codes,
-    "per-file-ignores": _codes_by_pattern,
-    "fail-on": _severity,
-    "baseline": _of_type(str, "a path"),
-    "circle": _of_type(bool, "true or false"),
-    "circle-steps": _of_type(int, "a whole number"),
-    "skip-others": _of_type(bool, "true or false"),
-    "jobs": _of_type(int, "a whole number"),
-}
-"""How the value of each key is checked; keys are named as the options of `check`."""
+_EXPECTED: Final = {str(field.alias): field.description for field in _Table.model_fields.values()}
+"""What is expected of each key."""
 
 
 def nearest_settings(folder: Path) -> Settings:
@@ -166,24 +154,24 @@ def nearest_settings(folder: Path) -> Settings:
 
 
 def _checked(table: Any, sections: Sequence[str], document: Document) -> dict[str, Any]:
-    def refuse_at(key: str) -> Refuse:
+    def refuse(key: str, words: str) -> NoReturn:
         spot = document.spot((*sections, key))
+        raise BusplanError(f"{document.name}:{spot.line}:{spot.column}: {key}: {words}")
 
-        def refuse(words: str) -> NoReturn:
-            raise BusplanError(f"{document.name}:{spot.line}:{spot.column}: {key}: {words}")
-
-        return refuse
-
-    values = {}
-    for key, value in table.items():
-        if key not in _CHECKS:
-            hint = did_you_mean(key, _CHECKS) or f"known here: {', '.join(_CHECKS)}"
-            refuse_at(key)(f"unknown key; {hint}")
-        values[key] = _CHECKS[key](value, refuse_at(key))
-        starts = values[key].values() if key == "per-file-ignores" else [values[key]]
-        for codes in starts if key in ("select", "ignore", "per-file-ignores") else ():
-            try:
-                checked_codes(codes, name=key)
-            except BusplanError as error:
-                refuse_at(key)(error.problems[0].removeprefix(f"{key} "))
+    if not isinstance(table, dict):
+        *sections, last = sections
+        refuse(last, "expected a table")
+    try:
+        values = _Table.model_validate(table).model_dump(by_alias=True, exclude_unset=True)
+    except ValidationError as error:
+        key = str(error.errors()[0]["loc"][0])
+        hint = did_you_mean(key, _EXPECTED) or f"known here: {', '.join(_EXPECTED)}"
+        refuse(key, f"expected {_EXPECTED[key]}" if key in _EXPECTED else f"unknown key; {hint}")
+    codes_of: list[tuple[str, Any]] = [(key, values.get(key, ())) for key in ("select", "ignore")]
+    codes_of += [("per-file-ignores", codes) for codes in values.get("per-file-ignores", {}).values()]
+    for key, codes in codes_of:
+        try:
+            checked_codes(codes, name=key)
+        except BusplanError as error:
+            refuse(key, error.problems[0].removeprefix(f"{key} "))
     return values
