@@ -26,6 +26,7 @@ def test_a_high_answer_opens_in_the_pager(on_terminal: OnTerminal, tmp_path: Pat
 def test_no_pager_opens_where_none_is_due(on_terminal: OnTerminal, tmp_path: Path) -> None:
     cases: list[tuple[tuple[str, ...], dict[str, str], bool]] = [
         (("--no-pager", "map", "paper-4ms"), {**LOW, **PAGER}, True),
+        (("map", "paper-4ms", "--no-pager"), {**LOW, **PAGER}, True),
         (("map", "paper-4ms"), {**HIGH, **PAGER}, True),
         (("map", "paper-4ms"), {**LOW, "PAGER": "cat"}, True),
         (("map", "paper-4ms"), {**LOW, **PAGER}, False),

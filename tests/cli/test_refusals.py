@@ -161,3 +161,28 @@ def test_a_key_of_very_many_parts_is_refused_at_once(tmp_path: Path, part: str) 
     )
     assert (done.returncode, done.stdout) == (2, b"")
     assert done.stderr == b"bad.toml:1:1: a key of more than 20 parts is no profile's\n"
+
+
+@pytest.mark.parametrize(
+    ("most_bytes", "told"), [(150_000_000, "150 MB (ulimit -v), and busplan needs 200"), (250_000_000, "")]
+)
+def test_too_little_memory_is_no_verdict(tmp_path: Path, most_bytes: int, told: str) -> None:
+    # A log whose frames need more than 250 MB, and a circle whose linear algebra needs more than 150 MB.
+    with (tmp_path / "long.log").open("w", encoding="utf-8") as file:
+        file.writelines(
+            f"({place / 2000:.6f}) can0 {0x100 + place % 20:03X}#1122334455667788\n" for place in range(600_000)
+        )
+    arguments = ("circle-test", "paper-1ms") if told else ("import", "long.log", "-o", "machine.toml")
+    program = LITTLE_MEMORY.replace("(2 << 30, 2 << 30)", f"({most_bytes}, {most_bytes})")
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("not enough memory")
+    assert told in done.stderr
+    assert not (tmp_path / "machine.toml").exists()

@@ -2,13 +2,14 @@
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from busplan import __version__
-from busplan.cli.lazy import SETTINGS, LazyGroup
+from busplan.cli.lazy import SETTINGS, LazyGroup, NoPagerOption
 from busplan.cli.output import CANNOT, PAGER, PLAN_FAILS, PlanFailsError, mend_streams, say, signals_end_the_run
 from busplan.errors import BusplanError
 
@@ -45,9 +46,7 @@ def _options(
     _version: Annotated[
         bool, typer.Option("--version", help="Show the version and exit.", callback=_print_version, is_eager=True)
     ] = False,
-    no_pager: Annotated[
-        bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is higher than the terminal.")
-    ] = False,
+    no_pager: NoPagerOption = False,
 ) -> None:
     if no_pager:
         os.environ[PAGER] = ""
@@ -57,6 +56,7 @@ def run() -> None:
     """Run the command line and exit with one of the codes in its epilog."""
     mend_streams()
     try:
+        _require_memory()
         with signals_end_the_run():
             app(prog_name="busplan")
     except SystemExit as leaving:
@@ -68,9 +68,28 @@ def run() -> None:
         say(*error.problems)
     except OSError as error:
         say(_in_words(error))
+    except MemoryError:
+        say("not enough memory")
     except Exception as error:  # noqa: BLE001 - Python's exit code 1 would read as a verdict
         say(f"busplan itself failed ({type(error).__name__}: {error}); please report this")
     sys.exit(CANNOT)
+
+
+_LEAST_BYTES: Final = 200_000_000
+"""Least address space: with less, numpy's linear algebra ends the process with 1, which would read as a verdict."""
+
+
+def _require_memory() -> None:
+    """Refuse a limit on memory that no command is sure to keep."""
+    with suppress(ImportError):  # no POSIX
+        from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
+
+        most_bytes, _ = getrlimit(RLIMIT_AS)
+        if most_bytes != RLIM_INFINITY and most_bytes < _LEAST_BYTES:
+            raise BusplanError(
+                f"not enough memory: this process may use {most_bytes / 1e6:.0f} MB (ulimit -v), "
+                f"and busplan needs {_LEAST_BYTES / 1e6:.0f}"
+            )
 
 
 def _in_words(error: OSError) -> str:

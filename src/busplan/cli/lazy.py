@@ -1,11 +1,13 @@
 """Commands that are loaded when they are called, and the layout of their help: plain names, and exit codes."""
 
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from copy import copy
+from functools import wraps
 from importlib import import_module
-from inspect import cleandoc, signature
+from inspect import Parameter, cleandoc, signature
 from types import MappingProxyType
 from typing import Annotated, Any, Final, get_args, get_origin
 
@@ -14,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
 from typer.main import get_command
 
+from busplan.cli.output import PAGER
 from busplan.errors import BusplanError
 
 FAILURES: Final = (
@@ -147,6 +150,27 @@ def _declared(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+NoPagerOption = Annotated[
+    bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is longer than the terminal.")
+]
+
+
+def _with_pager_option(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the option `--no-pager`, which also stands before it."""
+
+    @wraps(command)
+    def run(*, no_pager: bool, **values: Any) -> None:
+        if no_pager:
+            os.environ[PAGER] = ""
+        command(**values)
+
+    written = signature(command)
+    last = Parameter("no_pager", Parameter.KEYWORD_ONLY, default=False, annotation=NoPagerOption)
+    run.__signature__ = written.replace(parameters=[*written.parameters.values(), last])  # type: ignore[attr-defined]
+    run.__annotations__ = {**command.__annotations__, "no_pager": NoPagerOption}
+    return run
+
+
 class LazyGroup(TyperGroup):
     """The program's group of commands, each loaded at its first use; its help lists them first."""
 
@@ -159,7 +183,7 @@ class LazyGroup(TyperGroup):
             single = typer.Typer(
                 add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=SETTINGS
             )
-            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(_declared(command))
+            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(_with_pager_option(_declared(command)))
             self.commands[cmd_name] = get_command(single)
         return self.commands.get(cmd_name)
 
