@@ -184,19 +184,6 @@ def test_a_column_that_is_not_there_is_a_key_error() -> None:
     assert "max_axes" in answer
 
 
-def test_columns_that_are_not_there_or_no_numbers_are_refused() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
-    calls: list[tuple[Any, str]] = [
-        (lambda: answer.drawing(figure="verdict"), "figure verdict: expected a column in numbers: bus.nodes, "),
-        (lambda: answer.report(sort_by="axis"), "sort_by axis: expected a column in numbers: bus.nodes, "),
-        (lambda: answer.report(columns=["axis"]), "columns axis: no such column; there are bus.nodes, timing_model"),
-        (lambda: answer.rows_in("csv", ["axis"]), "columns axis: no such column; there are bus.nodes, timing_model"),
-    ]
-    for call, message in calls:
-        with pytest.raises(busplan.BusplanError, match=f"^{re.escape(message)}"):
-            call()
-
-
 def test_what_makes_no_sweep_is_refused() -> None:
     cases: list[tuple[Any, Any, str]] = [
         ({}, {}, "vary {}: expected keys of the profile and their values"),

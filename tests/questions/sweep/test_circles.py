@@ -57,15 +57,14 @@ class _Lazy(Future[Any]):
 
 
 def test_a_sweep_is_the_same_on_every_executor() -> None:
-    def document(executor: Executor | None, *, summary: bool = False) -> str:
-        return busplan.sweep("paper-1ms", vary=SMALL, circle=True, executor=executor, summary=summary).to_json()
+    def document(executor: Executor | None) -> str:
+        return busplan.sweep("paper-1ms", vary=SMALL, circle=True, executor=executor).to_json()
 
-    alone, summary, shuffled = document(None), document(None, summary=True), Shuffled(7)
+    alone, shuffled = document(None), Shuffled(7)
     assert alone.count('"passed"') == 12 * 2
     with ThreadPoolExecutor(3) as threads, workers(1) as processes:
         for executor in (shuffled, threads, processes):
             assert document(executor) == alone
-            assert document(executor, summary=True) == summary
             # It is the caller's, and goes on.
             assert executor.submit(abs, -1).result(timeout=300) == 1
     assert shuffled.order != sorted(shuffled.order)
@@ -87,7 +86,6 @@ def test_the_first_point_that_cannot_be_run_is_named_before_any_is(beside: dict[
     [
         ({"executor": ThreadPoolExecutor(1)}, "executor: goes with circle=True"),
         ({"circle": True, "executor": 3}, "executor 3: expected a concurrent.futures.Executor"),
-        ({"summary": True}, "summary: goes with circle"),
     ],
 )
 def test_refusals(options: dict[str, Any], words: str) -> None:

@@ -1,6 +1,6 @@
 """`busplan.sweep`."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -12,17 +12,15 @@ from busplan.buses.figure import TIMING_MODEL, unit_of
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
-from busplan.forms.blocks import Chart, Code, Report, Sentence
-from busplan.forms.charts import Drawing
+from busplan.forms.blocks import Code, Report, Sentence
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
 from busplan.questions.circle import CIRCLE_BY_KEY
-from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor, summaries
-from busplan.questions.sweep.digest import default_columns, sentences, top_rows
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor
+from busplan.questions.sweep.digest import first_rows, sentences
 from busplan.questions.sweep.grid import Array, Columns, axis_values
-from busplan.questions.sweep.plot import not_drawable, require_drawable, sweep_drawing
 from busplan.questions.sweep.rows import arrow_table, written_rows
 from busplan.questions.sweep.table import Sweep, checked_sweep, column_figures, figure_table
 from busplan.sections.profile import Profile
@@ -33,7 +31,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import xarray as xr
 
-__all__ = ["SweepAnswer", "axis_values", "checked_sweep", "computed", "require_drawable", "sweep"]
+__all__ = ["SweepAnswer", "axis_values", "checked_sweep", "computed", "sweep"]
 
 _SHOWN: Final = 20
 """Rows of the report."""
@@ -71,7 +69,8 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             raise KeyError(f"no column {name!r}; there are {', '.join(self.table)}")
         column = self.table[name]
         words = set(column.tolist()) if column.dtype == object else set()
-        if name in self.sweep.numbers or all(isinstance(word, bool) for word in words):
+        figure = column_figures(self.sweep.network).get(name)
+        if (figure and "word" not in figure.sort) or all(isinstance(word, bool) for word in words):
             return column.copy()
         texts = {word: str(spelled(word)) for word in words}
         return np.array([texts[word] for word in column.tolist()])
@@ -167,27 +166,9 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         """Write the document of `busplan sweep --format json`."""
         return b"".join(self.rows_in("json")).decode()
 
-    def rows_in(self, form: RowsForm, columns: Sequence[str] | None = None) -> Iterator[bytes]:
-        """Write every row, piece by piece.
-
-        Parameters
-        ----------
-        form
-            The form; "parquet" needs the extra `table`.
-        columns
-            Names of columns, behind the varied keys and the timing model; by default all.
-
-        Raises
-        ------
-        BusplanError
-            No such column.
-        """
-        names = self._behind_keys(columns or self.columns)
-        return written_rows(form, self.sweep, {name: self.table[name] for name in names})
-
-    def _behind_keys(self, columns: Iterable[str]) -> tuple[str, ...]:
-        self.sweep.require_columns(columns, name="columns")
-        return tuple(dict.fromkeys((*self.sweep.grid.axes, TIMING_MODEL.key, *columns)))
+    def rows_in(self, form: RowsForm) -> Iterator[bytes]:
+        """Write every row, piece by piece; "parquet" needs the extra `table`."""
+        return written_rows(form, self.sweep, self.table)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         rows = {ending: partial(self._bytes_in, form) for ending, form in ROWS_ENDINGS.items()}
@@ -196,66 +177,13 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     def _bytes_in(self, form: RowsForm) -> bytes:
         return b"".join(self.rows_in(form))
 
-    def drawing(self, *, figure: str | None = None) -> Drawing:
-        """Draw a figure over one or two varied keys: the picture of `busplan sweep --plot`.
-
-        Parameters
-        ----------
-        figure
-            Name of a column in numbers; by default the safe axes and, where these do not vary, the corrected margin.
-
-        Raises
-        ------
-        BusplanError
-            No column in numbers, more than two keys vary, or there are too many points.
-        """
-        self.sweep.require_number(figure, name="figure")
-        title = ", ".join(filter(None, (self.profile.name, self.sweep.changes.words)))
-        return sweep_drawing(self.sweep, self.table, title=title, figure=figure)
-
-    def _repr_html_(self) -> str:
-        from busplan.forms.html import fragment
-
-        report = self._shown()
-        if not not_drawable(self.sweep.grid):
-            drawing = sweep_drawing(self.sweep, self.table, title=self.profile.name)
-            report = report._replace(blocks=(*report.blocks, Chart(drawing, Sentence(drawing.words))))
-        return fragment(report)
-
     def sentences(self) -> tuple[Sentence, ...]:
         """How many points there are, how many fit, and what is wrong at others."""
         return tuple(sentences(self.sweep, self.table))
 
-    def report(
-        self,
-        *,
-        columns: Sequence[str] | None = None,
-        top: int = _SHOWN,
-        sort_by: str | None = None,
-        ascending: bool = False,
-    ) -> Report:
-        """The answer in blocks, with some rows.
-
-        Parameters
-        ----------
-        columns
-            Names of columns, behind the varied keys and the timing model, and before `sort_by`; by default the main
-            ones.
-        top
-            Most rows.
-        sort_by
-            Column in numbers to sort by; by default rows are in the order of the grid.
-        ascending
-            Smallest first.
-
-        Raises
-        ------
-        BusplanError
-            No such column, or none in numbers.
-        """
-        self.sweep.require_number(sort_by, name="sort_by")
-        shown = self._behind_keys((*(columns or default_columns(self.sweep)), *([sort_by] if sort_by else [])))
-        rows = top_rows(self.sweep, self.table, columns=shown, top=top, sort_by=sort_by, ascending=ascending)
+    def report(self, *, most: int | None = _SHOWN) -> Report:
+        """The answer in blocks, with its first rows; None for every row."""
+        rows = first_rows(self.sweep, self.table, most=most)
         return Report(Sentence(("Sweep of ", Code(self.profile.name))), (*self.sentences(), *rows), {})
 
 
@@ -264,9 +192,7 @@ def sweep(
     *,
     vary: Mapping[str, str | Iterable[object]],
     timing_model: Models | None = None,
-    group: str | None = None,
     circle: bool = False,
-    summary: bool = False,
     unlimited: bool = False,
     executor: Executor | None = None,
     progress: Progress = ignored,
@@ -283,14 +209,8 @@ def sweep(
     timing_model
         Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
         the paper's equations as published, and "standard" for the standard's clock and packets.
-    group
-        Of a profile with groups, the name of the one whose nodes vary for the most and the safe nodes and axes; the
-        others are as they are. By default that with the most axes.
     circle
         Also run the circle test of every point, and add its columns (errors in mm, margins).
-    summary
-        With `circle` and values of delivery.seed: a row for each point of the other keys, with mean, sample standard
-        deviation, 95 % quantile and worst of each figure of the circle over the seeds, and the share that failed.
     unlimited
         Allow more than 1,000 circle tests.
     executor
@@ -332,9 +252,7 @@ def sweep(
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
-    checked = checked_sweep(
-        network, vary, timing_models=models, group=group, circle=circle, summary=summary, unlimited=unlimited
-    )
+    checked = checked_sweep(network, vary, timing_models=models, circle=circle, unlimited=unlimited)
     return computed(checked, executor=executor, progress=progress)
 
 
@@ -358,12 +276,8 @@ def computed(sweep: Sweep, *, executor: Executor | None = None, progress: Progre
     require_executor(executor, circle=sweep.circle)
     table = figure_table(sweep, progress=ignored if sweep.circle else progress)
     if sweep.circle:
-        results = circle_results(sweep.profile, sweep.grid, sweep.tests, executor=executor, progress=progress)
-        of_points = (
-            {name: _typed(name, values) for name, values in zip(CIRCLE_COLUMNS, results, strict=True)}
-            if sweep.seeds is None
-            else summaries(results.reshape(len(CIRCLE_COLUMNS), sweep.grid.points, -1))
-        )
+        results = circle_results(sweep.profile, sweep.grid, executor=executor, progress=progress)
+        of_points = {name: _typed(name, values) for name, values in zip(CIRCLE_COLUMNS, results, strict=True)}
         # One test a point, the same beside every timing model.
         models = len(sweep.timing_models)
         table |= {name: np.repeat(values, models) for name, values in of_points.items()}

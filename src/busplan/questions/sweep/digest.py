@@ -41,12 +41,8 @@ _RANKS: Final[Mapping[str, int]] = MappingProxyType(
     }
 )
 """Default figures of a table, each with its `TableColumn.rank`."""
-_OF_CIRCLES: Final = (
-    *("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed"),
-    *("failed_share", "failed_share_high", "max_contour_error_mean_mm"),
-    *("max_contour_error_std_mm", "max_contour_error_p95_mm", "max_contour_error_worst_mm"),
-)
-"""Default figures of circle tests, and of their summary over seeds."""
+_OF_CIRCLES: Final = (*("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed"),)
+"""Default figures of circle tests."""
 
 
 def default_columns(sweep: Sweep) -> tuple[str, ...]:
@@ -82,7 +78,7 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
     # Settings of the bus and the circle are the same under every model.
     _, first = next(_by_model(sweep, table))
     if sweep.circle:
-        yield from _circles(sweep, table) if sweep.seeds is None else _over_seeds(first, sweep.seeds.size)
+        yield from _circles(sweep, table)
     yield from payload_sentences(sweep.profile, sweep.grid.axes)
     if sweep.group:
         yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(sweep.group))
@@ -119,34 +115,14 @@ def _circles(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
         yield joined(head, joined(*counts, by=" and "), Sentence((".",)), by="")
 
 
-def _over_seeds(figures: Columns, seeds: int) -> Iterator[Sentence]:
-    """Points whose circle fails with no, some and every seed."""
-    failed = figures["failed_share"]
-    judged, never, always = (int(np.sum(points)) for points in (failed >= 0, failed == 0, failed == 1))
-    if judged:
-        counts = map(_points, (seeds, never, judged - never - always, always))
-        words = (
-            f"The circle holds every tolerance with each of {{}} seeds at {{}} of {judged:,} {nouns(judged, 'point')}, "
-        )
-        yield sentence(f"{words}fails with some at {{}} and with all at {{}}.", *counts)
-    yield from _unjudged(failed.size - judged)
-    unmoved = int(np.sum(figures["max_contour_error_std_mm"] == 0))
-    if unmoved:
-        words = f"At {{}} {nouns(unmoved, 'point')} all seeds gave the same circle: a seed draws for {{}} and {{}}."
-        drawn = Code("delivery.jitter_us"), Code("delivery.loss_probability")
-        yield sentence(words, _points(unmoved), *drawn, state="warns")
-
-
 def _unjudged(points: int) -> Iterator[Sentence]:
     if points:
         words = "The circle is not judged at {}: no contour tolerance is asked for, or no error source matters."
         yield sentence(words, _points(points), state="warns")
 
 
-def top_rows(
-    sweep: Sweep, table: Columns, *, columns: tuple[str, ...], top: int, sort_by: str | None, ascending: bool
-) -> tuple[Sentence, Table]:
-    """The first or best rows, after how many there are; headings are the names that --columns and --sort take.
+def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[Sentence, Table]:
+    """The first rows, after how many there are; headings are the names of the columns.
 
     Parameters
     ----------
@@ -154,33 +130,20 @@ def top_rows(
         The sweep.
     table
         All its columns.
-    columns
-        Names of those shown; the timing model is one.
-    top
-        Most rows.
-    sort_by
-        Column in numbers to sort by; None for the order of the grid.
-    ascending
-        Smallest first.
+    most
+        Most rows; None for every row.
     """
-    total, order = table[TIMING_MODEL.key].size, ""
-    places = np.arange(total)
-    if sort_by is not None:
-        ranks = table[sort_by].astype(float)
-        # NaN comes last and is left out; among equals, the first in the grid comes first.
-        places = np.argsort(ranks if ascending else -ranks, kind="stable")[: np.sum(~np.isnan(ranks))]
-        order = f", {'smallest' if ascending else 'largest'} {sort_by} first"
-    records = plain_rows(sweep, {name: table[name] for name in columns}, places[:top])
+    columns = (*sweep.grid.axes, TIMING_MODEL.key, *default_columns(sweep))
+    total = table[TIMING_MODEL.key].size
     figures = column_figures(sweep.network)
-    # Columns that were asked for by name stay.
-    ranks_of = _RANKS if set(_RANKS) <= set(columns) else {}
-    shown, words = _points(len(records)), f"{nouns(total, 'row')}{order}."
+    records = plain_rows(sweep, {name: table[name] for name in columns}, np.arange(total)[:most])
+    shown, words = _points(len(records)), f"{nouns(total, 'row')}."
     return (
         sentence(f"{{}} of {{}} {words}", shown, _points(total))
         if len(records) < total
         else sentence(f"{{}} {words}", shown),
         Table(
-            tuple(_column(name, figures.get(name), rank=ranks_of.get(name, 0)) for name in columns),
+            tuple(_column(name, figures.get(name), rank=_RANKS.get(name, 0)) for name in columns),
             tuple(TableRow(tuple(_cells(record, figures))) for record in records),
             heads=columns.index(TIMING_MODEL.key) + 1,
         ),

@@ -34,7 +34,6 @@ def sweep_facts(sweep: Sweep) -> JsonDocument:
         timing_models=list(sweep.timing_models),
         **({"group": sweep.group} if sweep.group else {}),
         points=sweep.grid.points,
-        **({} if sweep.seeds is None else {"seeds": sweep.seeds.size}),
     )
     return changed_document(facts, sweep.changes)
 
