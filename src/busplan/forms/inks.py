@@ -19,18 +19,6 @@ class InkColours(NamedTuple):
     """On a dark background."""
 
 
-def _shades(name: str, pale: tuple[int, int, int], deep: tuple[int, int, int]) -> dict[str, InkColours]:
-    """Colours from pale to deep, evenly; black letters are read on all of them."""
-    shades = {}
-    for level in range(LEVELS):
-        share = level / (LEVELS - 1)
-        parts = (round(start + share * (end - start)) for start, end in zip(pale, deep, strict=True))
-        shades[f"{name}-{level}"] = InkColours(*[f"#{''.join(f'{part:02x}' for part in parts)}"] * 2)
-    return shades
-
-
-LEVELS: Final = 10
-"""Colours of numbers above zero, and of those below."""
 INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
     {
         "first": InkColours("#1d4f91", "#8cb8f5"),
@@ -56,8 +44,6 @@ INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
         "uneven": InkColours("#74aef7", "#6ea8f5"),
         "unjudged": InkColours("#bfe3c4", "#a5d0ab"),
         "refused": InkColours("#b59ae0", "#a78fd4"),
-        **_shades("above", (233, 241, 252), (52, 128, 216)),
-        **_shades("below", (251, 228, 224), (214, 84, 72)),
     }
 )
 """Colours by ink; the name of an ink is its CSS class."""

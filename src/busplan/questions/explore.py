@@ -14,12 +14,23 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Explorer, JsonDocument, Record, Report, Sentence, Slider
 from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_network
+from busplan.questions.base.inputs import ProfileLike, load_network, require_cycle
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.capacity.verdict import card, verdict_of
 from busplan.questions.fit.figures import capacity_figures
 from busplan.questions.fit.network import changed, model_names, varied_nodes
-from busplan.questions.map import Along, Cell, Direction, MapAnswer, NotDrawn, design_value, direction, map_, setting_at
+from busplan.questions.map import (
+    Along,
+    Cell,
+    Direction,
+    MapAnswer,
+    NotDrawn,
+    design_value,
+    direction,
+    directions,
+    map_,
+    setting_at,
+)
 from busplan.questions.map.report import circle_words, map_document, map_drawing, title_of, value_text
 from busplan.sections.base import TRANSACTION_KINDS, value_at
 
@@ -56,8 +67,9 @@ class ExploreAnswer(Answer):
         """The answer in blocks: sliders on a page of HTML, the map of this design in every other form."""
         number = 0 if self.over is None else _own_place(self.over, self.network)
         here = self.maps[number]
-        row, column = _own_place(here.y, self.network), _own_place(here.x, self.network)
-        cards, columns = self.cards[number], len(here.x.values)
+        up, across = here.directions
+        row, column = _own_place(up, self.network), _own_place(across, self.network)
+        cards, columns = self.cards[number], len(across.values)
         # The profile's own values, unless these are no setting here.
         place, first = min(
             ((place, made) for place, made in enumerate(cards) if made is not None),
@@ -65,7 +77,7 @@ class ExploreAnswer(Answer):
         )
         row, column = divmod(place, columns)
         # The first slider is the vertical direction, as in the title of a map.
-        places = [(here.y, row), (here.x, column), *([] if self.over is None else [(self.over, number)])]
+        places = [(up, row), (across, column), *([] if self.over is None else [(self.over, number)])]
         sliders = tuple(
             Slider(title_of(along, here.profile), tuple(value_text(along, value) for value in along.values), place)
             for along, place in places
@@ -148,9 +160,13 @@ def explore(
     third = _third(network, over, with_circle=circle)
     values = (None,) if third is None else third.values
     networks = [network if value is None or third is None else changed(network, {third.key: value}) for value in values]
-    own = map_(network.profile, x=x, y=y)
-    across, up = ({along.key: list(along.values)} for along in (own.x, own.y))
-    _require_few(own.x, own.y, third)
+    if x is None or y is None:
+        require_cycle(
+            network.profile, question="an explorer of period and axes", instead="give x and y, each a key with values"
+        )
+    chosen = directions(network, x, y, with_circle=circle)
+    _require_few(*chosen, third)
+    across, up = ({along.key: list(along.values)} for along in chosen)
     maps, cards = [], []
     for number, variant in enumerate(networks):
         part = part_of(progress, number=number, of=len(networks))
@@ -207,7 +223,7 @@ def _cards(answer: MapAnswer, progress: Progress) -> Iterator[Card | None]:
 
 
 def _card(answer: MapAnswer, cell: Cell | NotDrawn) -> Card | None:
-    setting = setting_at(answer.network, {answer.x.key: cell.x, answer.y.key: cell.y})
+    setting = setting_at(answer.network, answer.values_at(cell))
     if isinstance(cell, NotDrawn) or isinstance(setting, str):
         return None
     results = tuple(capacity_figures(setting.network, model=model) for model in model_names(setting.network))

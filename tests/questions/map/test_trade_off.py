@@ -2,6 +2,7 @@
 
 import re
 from itertools import islice, product
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -290,3 +291,45 @@ def test_too_many_circles_are_refused_before_any_is_run() -> None:
     y = {PERIOD: range(8000, 14400, 100)}
     with pytest.raises(busplan.BusplanError, match="1,024 settings fit, and a map runs up to 1,000 circle tests"):
         busplan.map_(SMALL, x={"bus.nodes": range(1, 21)}, y=y, circle=True)
+
+
+def test_one_key_gives_the_curve_of_the_free_time() -> None:
+    answer = busplan.map_("gantry-24", x={"cycle.period_us": [500, 1000, 2000]})
+    assert answer.y is None
+    assert answer.design is answer.rows[0][1]
+    for cell, period_us in zip(answer.cells, (500, 1000, 2000), strict=True):
+        (deciding,) = busplan.capacity("gantry-24", period_us=period_us, timing_model="standard").results
+        assert (cell.verdict, cell.margin_corrected_us, cell.available_us) == (
+            deciding.verdict,
+            deciding.margin_corrected_us,
+            deciding.available_us,
+        )
+    document = answer.to_dict()
+    assert (document["y"], [cell["cycle.period_us"] for cell in document["cells"]]) == (None, [500, 1000, 2000])
+    lines = str(answer).splitlines()
+    assert [line.split("  ")[0] for line in lines[-3:]] == ["500 us", "1 ms", "2 ms"]
+    (panel,) = answer.drawing().panels
+    curve = panel.plot.curves[0]
+    assert curve.points == tuple(
+        zip((500.0, 1000.0, 2000.0), (cell.margin_corrected_us for cell in answer.cells), strict=True)
+    )
+    assert [(shade.entry.words, shade.low, shade.high) for shade in panel.plot.shades] == [("does not fit", 500, 750)]
+
+
+def test_words_of_one_key_are_points_without_a_line() -> None:
+    (panel,) = busplan.map_("paper-4ms", x={"bus.gap_count": [63, "optimal"]}).drawing().panels
+    assert [tick.label for tick in panel.plot.across.ticks] == ["63", "optimal"]
+    assert not any(curve.has_line for curve in panel.plot.curves)
+
+
+def test_one_key_of_messages_alone_has_verdicts(tmp_path: Path) -> None:
+    path = tmp_path / "messages.toml"
+    message = 'name = "a"\nidentifier = 1\npayload_bytes = 8\nperiod_us = 5000\n'
+    path.write_text(
+        f'schema_version = 1\nname = "car"\n[bus]\nkind = "can"\nbit_rate_kbit_s = 125\n[[message]]\n{message}',
+        encoding="utf-8",
+    )
+    answer = busplan.map_(path, x={"bus.bit_rate_kbit_s": [10, 125]})
+    assert [cell.verdict for cell in answer.cells] == ["does not fit", "fits"]
+    assert [cell.margin_corrected_us for cell in answer.cells] == [None, None]
+    assert str(answer).splitlines()[-1].split() == ["125", "fits"]

@@ -71,7 +71,8 @@ class Cell(NamedTuple):
     """The verdict at one setting."""
 
     x: Value
-    y: Value
+    y: Value | None
+    """None where one key alone varies."""
     nodes: int
     axes: int
     state: State
@@ -81,10 +82,11 @@ class Cell(NamedTuple):
     binding_term: str | None
     """The largest term of the cycle."""
     verdict: VerdictWord
+    available_us: float | None
+    """This and the figures below are None for messages alone."""
     margin_corrected_us: float | None
-    """None for messages alone."""
     uncertainty_us: float | None
-    """None if it is unknown."""
+    """None also where it is unknown."""
     is_safe: bool
     circle_passed: bool | None = None
     """None if no circle was run, or the circle is not judged."""
@@ -96,7 +98,7 @@ class NotDrawn(NamedTuple):
     """A combination of values that no profile can have."""
 
     x: Value
-    y: Value
+    y: Value | None
     reason: str
 
 
@@ -119,18 +121,27 @@ class MapAnswer(OfNetwork, Answer):
     network
         The network of the profile itself: this design.
     x, y
-        The directions.
+        The directions; y is None where one key alone varies.
     rows
-        A row for each value of `y`, a cell for each value of `x`.
+        A row for each value of `y`, a cell for each value of `x`; one row without y.
     with_circle
         Whether the circle test of every cell that fits was run.
     """
 
     network: Network
     x: Direction
-    y: Direction
+    y: Direction | None
     rows: tuple[tuple[Cell | NotDrawn, ...], ...]
     with_circle: bool
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """The directions: y before x, as a title names them."""
+        return (self.x,) if self.y is None else (self.y, self.x)
+
+    def values_at(self, cell: "Cell | NotDrawn") -> dict[str, Value]:
+        """Values of a cell by the keys of the directions, x first."""
+        return {self.x.key: cell.x} if self.y is None or cell.y is None else {self.x.key: cell.x, self.y.key: cell.y}
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -145,10 +156,10 @@ class MapAnswer(OfNetwork, Answer):
     @property
     def design_place(self) -> tuple[int, int] | None:
         """Row and column of the profile's own values; None if they are not on the map."""
-        x, y = (design_value(direction.key, self.network) for direction in (self.x, self.y))
-        if x not in self.x.values or y not in self.y.values:
-            return None
-        return self.y.values.index(y), self.x.values.index(x)
+        x = design_value(self.x.key, self.network)
+        y = None if self.y is None else design_value(self.y.key, self.network)
+        up = (None,) if self.y is None else self.y.values
+        return (up.index(y), self.x.values.index(x)) if x in self.x.values and y in up else None
 
     @property
     def design(self) -> Cell | None:
@@ -193,7 +204,7 @@ def map_(
     x, y
         Quantities on the x and the y axis: one dotted key, or "axes" for the axes of all nodes, with up to 64 values in
         its unit, as `sweep` takes them: {"bus.gap_count": [7, 63, "optimal"]}. By default the axes, and the period
-        [us].
+        [us]; with x alone, one key varies, and the picture is the curve of the free time.
     circle
         Also run the circle test of every setting that fits, up to 1,000.
     progress
@@ -223,21 +234,25 @@ def map_(
     """
     require_executor(executor, circle=circle)
     network = load_network(profile)
-    if x is None or y is None:
-        require_cycle(
-            network.profile, question="a map of period and axes", instead="give x and y, each a key with values"
-        )
-    across, up = _directions(network, x, y, with_circle=circle)
+    if x is None:
+        require_cycle(network.profile, question="a map of period and axes", instead="give x, a key with values")
+    if x is not None and y is None:
+        across, up = direction(network.profile, x, name="x", with_circle=circle), None
+    else:
+        across, up = directions(network, x, y, with_circle=circle)
+    values_up = (None,) if up is None else up.values
     settings = {
-        (row, column): setting_at(network, {across.key: value_x, up.key: value_y})
-        for row, value_y in enumerate(up.values)
+        (row, column): setting_at(
+            network, {across.key: value_x} | ({up.key: value_y} if up and value_y is not None else {})
+        )
+        for row, value_y in enumerate(values_up)
         for column, value_x in enumerate(across.values)
     }
     possible = {place: setting for place, setting in settings.items() if isinstance(setting, Variant)}
     if not possible:
         raise BusplanError(f"no setting of this map can exist: {next(iter(settings.values()))}")
     cells = {
-        (row, column): _cell(setting.network, x=across.values[column], y=up.values[row])
+        (row, column): _cell(setting.network, x=across.values[column], y=values_up[row])
         for (row, column), setting in possible.items()
     }
     if circle:
@@ -248,14 +263,12 @@ def map_(
             cells[row, column] if (row, column) in cells else NotDrawn(value_x, value_y, str(settings[row, column]))
             for column, value_x in enumerate(across.values)
         )
-        for row, value_y in enumerate(up.values)
+        for row, value_y in enumerate(values_up)
     )
     return MapAnswer(network, across, up, rows, circle)
 
 
-def _directions(
-    network: Network, x: Along | None, y: Along | None, *, with_circle: bool
-) -> tuple[Direction, Direction]:
+def directions(network: Network, x: Along | None, y: Along | None, *, with_circle: bool) -> tuple[Direction, Direction]:
     """The directions along x and y; by default the axes of all nodes, and the period.
 
     Raises
@@ -271,9 +284,9 @@ def _directions(
         for name, along in (("x", x), ("y", y))
     )
     if across is None:
-        across = _defaultdirection(PERIOD if up is not None and up.key in (AXES, nodes_key) else AXES, network)
+        across = _default_direction(PERIOD if up is not None and up.key in (AXES, nodes_key) else AXES, network)
     if up is None:
-        up = _defaultdirection(AXES if across.key == PERIOD else PERIOD, network)
+        up = _default_direction(AXES if across.key == PERIOD else PERIOD, network)
     key_x, key_y = (nodes_key if direction.key == AXES else direction.key for direction in (across, up))
     if key_x == key_y:
         raise BusplanError(f"x = {across.key} and y = {up.key} both vary {key_x}; give two keys")
@@ -304,7 +317,7 @@ _BEYOND: Final = 2
 """Nodes drawn beyond the most that fit."""
 
 
-def _defaultdirection(key: str, network: Network) -> Direction:
+def _default_direction(key: str, network: Network) -> Direction:
     """A direction along `AXES` or `PERIOD` that shows where the design stops fitting."""
     varied = varied_nodes(network.profile)
     design_us, design_nodes = network.profile.cycle.period_us, int(varied.nodes)
@@ -401,7 +414,7 @@ def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     return varied_axes // node_axes
 
 
-def _cell(network: Network, *, x: Value, y: Value) -> Cell:
+def _cell(network: Network, *, x: Value, y: Value | None) -> Cell:
     """The verdict of `capacity` at a setting, before any circle test."""
     fit = figures(network, model=network.bus.deciding_model)
     unsafe = tuple(limit.key for limit in network.bus.limits if limit.role == "safety" and limit.is_broken(network))
@@ -421,6 +434,7 @@ def _cell(network: Network, *, x: Value, y: Value) -> Cell:
         reasons=limits,
         binding_term=fit.binding_term,
         verdict=verdict,
+        available_us=fit.available_us if network.groups else None,
         margin_corrected_us=fit.margin_corrected_us,
         uncertainty_us=fit.uncertainty_us,
         is_safe=fit.safe,

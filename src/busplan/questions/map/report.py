@@ -1,12 +1,12 @@
 """Answer of `busplan map`."""
 
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import isclose
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from busplan.buses.figure import Ink
+from busplan.buses.figure import MARGIN_CORRECTED, UNCERTAINTY, Ink, unit_of
 from busplan.buses.limits import Value
 from busplan.english import nouns
 from busplan.forms.blocks import (
@@ -22,13 +22,27 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
+    Words,
     attribute_value,
     count_value,
     joined,
     sentence,
 )
 from busplan.forms.blocks import State as Tone
-from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Entry, Panel, choices, letters
+from busplan.forms.charts import (
+    ChartCell,
+    ChartGrid,
+    Curve,
+    Curves,
+    Drawing,
+    Entry,
+    Guide,
+    Panel,
+    Shade,
+    choices,
+    letters,
+    numbers,
+)
 from busplan.forms.numbers import period_value, sentence_text, with_unit
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY
@@ -82,8 +96,13 @@ def _blocks(answer: MapAnswer) -> Iterator[Block]:
     headline, looks = _headline(answer), _looks(answer)
     yield headline
     yield from _remarks(answer)
-    title = " against ".join(title_of(direction, answer.profile) for direction in (answer.y, answer.x))
-    steps = "" if _is_even(answer.y) and _is_even(answer.x) else ", in unequal steps"
+    if answer.y is None:
+        if answer.network.groups:
+            yield Chart(_curve(answer), Sentence((_CURVE.format(key=title_of(answer.x, answer.profile)),)))
+        yield _values_table(answer)
+        return
+    title = " against ".join(title_of(direction, answer.profile) for direction in answer.directions)
+    steps = "" if all(map(_is_even, answer.directions)) else ", in unequal steps"
     marked = "" if answer.design is None else ", this design marked"
     caption = sentence(f"{{}} of {{}} settings fit, {title}{steps}{marked}", *_counts(answer))
     yield Chart(map_drawing(answer), caption)
@@ -119,7 +138,7 @@ def _remarks(answer: MapAnswer) -> Iterator[Sentence]:
         yield Sentence(
             ("Not every circle is judged: no contour tolerance is asked for, or no error source matters.",), "warns"
         )
-    yield from payload_sentences(answer.profile, (answer.x.key, answer.y.key))
+    yield from payload_sentences(answer.profile, [direction.key for direction in answer.directions])
 
 
 _Looks = Mapping[tuple[State, tuple[str, ...]], Look]
@@ -155,24 +174,105 @@ def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> D
         legend.append(Entry("frame", "this design" if frame is None else "this setting"))
     if answer.not_drawn:
         legend.append(Entry("blank", "blank: cannot exist"))
-    across, up = (
+    up, across = (
         choices(
             f"{title_of(direction, answer.profile)}{'' if _is_even(direction) else ' in unequal steps'}",
             (value_text(direction, value) for value in direction.values),
             own=place,
         )
-        for direction, place in zip((answer.x, answer.y), design or (None, None), strict=True)
+        for direction, place in zip(answer.directions, design[::-1] if design else (None, None), strict=True)
     )
     rows = tuple(tuple(_cell(answer, cell, looks) for cell in row) for row in answer.rows)
     title = sentence_text(_headline(answer))
     return Drawing(title, (Panel(ChartGrid(across, up, rows, tuple(legend), design)),), has_characters=True)
 
 
+_CURVE: Final = "Free time with its uncertainty, over {key}"
+_MOST_DOTS: Final = 24
+"""Most points of a curve that have a mark each."""
+
+
+def _curve(answer: MapAnswer) -> Drawing:
+    """Draw the free time of one varied key, its uncertainty, and where it is not shown to fit."""
+    names = [value_text(answer.x, value) for value in answer.x.values]
+    values = [value for value in answer.x.values if isinstance(value, int | float) and not isinstance(value, bool)]
+    is_line = len(values) == len(names)
+    places = [float(value) for value in values] if is_line else [float(place) for place in range(len(names))]
+    row = [cell if isinstance(cell, Cell) else None for cell in answer.rows[0]]
+    free_us, ends_us = [cell and cell.margin_corrected_us for cell in row], [cell and _ends_us(cell) for cell in row]
+    own = None if answer.design_place is None else places[answer.design_place[1]]
+    title = title_of(answer.x, answer.profile)
+    unit = unit_of(answer.x.key)
+    label = f"{title}, {unit}" if unit and is_line else title
+    across = numbers(label, places[0], places[-1]) if is_line else choices(label, names, own=own)
+    shown_us = [us for us in (0.0, *free_us, *chain(*filter(None, ends_us))) if us is not None]
+    middles = [(left + right) / 2 for left, right in pairwise(places)]
+    edges = [across.low, *middles, across.high]
+    shades = (
+        Shade(Entry(LOOKS[cell.state].ink, _state_words(answer, cell.state)), *ends)
+        for cell, *ends in zip(row, edges, edges[1:], strict=False)
+        if cell is not None and cell.state != FITS
+    )
+    curves = [
+        Curve(
+            Entry("first", "free time", "o", "line"),
+            tuple(zip(places, free_us, strict=True)),
+            words=tuple("" if cell is None else _cell_words(answer, cell) for cell in row),
+            has_dots=len(places) <= _MOST_DOTS,
+            has_line=is_line,
+        )
+    ]
+    if any(ends_us):
+        curves += [
+            Curve(
+                Entry("gap", "with its uncertainty" if end else "", shape="line"),
+                tuple((place, ends and ends[end]) for place, ends in zip(places, ends_us, strict=True)),
+                has_dots=not is_line,
+                has_line=is_line,
+            )
+            for end in (0, 1)
+        ]
+    guides = [Guide(Entry("limit", "no free time", shape="line"), y=0.0)]
+    guides += [] if own is None else [Guide(Entry("own", "this design", shape="line"), x=own)]
+    up = numbers("free time, us", min(shown_us), max(shown_us), room=0.06)
+    return Drawing(
+        sentence_text(_headline(answer)), (Panel(Curves(across, up, tuple(curves), tuple(guides), tuple(shades))),)
+    )
+
+
+def _ends_us(cell: Cell) -> tuple[float, float] | None:
+    """Ends of the free time by its uncertainty; None where that is unknown [us]."""
+    if cell.margin_corrected_us is None or cell.uncertainty_us is None:
+        return None
+    return cell.margin_corrected_us - cell.uncertainty_us, cell.margin_corrected_us + cell.uncertainty_us
+
+
+def _values_table(answer: MapAnswer) -> Table:
+    """Verdict, limit and free time at each value of one key."""
+    columns = (
+        TableColumn(title_of(answer.x, answer.profile), kind="words"),
+        TableColumn("verdict", kind="words"),
+        TableColumn("limited by", kind="words", wraps=True),
+        *((TableColumn("free", "us"), TableColumn("+/-", "us")) if answer.network.groups else ()),
+    )
+    rows = []
+    for cell in answer.cells:
+        state = Words(_state_words(answer, cell.state), LOOKS[cell.state].tone)
+        times = [attribute_value(figure, cell) for figure in (MARGIN_CORRECTED, UNCERTAINTY)]
+        words = (value_text(answer.x, cell.x), state, _limit_words(answer, cell))
+        rows.append(TableRow((*words, *(times if answer.network.groups else ())), highlighted=cell is answer.design))
+    return Table(columns, tuple(rows), heads=1)
+
+
+def _cell_words(answer: MapAnswer, cell: Cell) -> str:
+    return f"{_setting_words(answer, cell)}: {_verdict_words(answer, cell)}"
+
+
 def _cell(answer: MapAnswer, cell: Cell | NotDrawn, looks: _Looks) -> ChartCell | None:
     if isinstance(cell, NotDrawn):
         return None
     look = looks[cell.state, cell.reasons]
-    return ChartCell(look.ink, look.mark, f"{_setting_words(answer, cell)}: {_verdict_words(answer, cell)}", look.tone)
+    return ChartCell(look.ink, look.mark, _cell_words(answer, cell), look.tone)
 
 
 def _regions_table(answer: MapAnswer, looks: _Looks) -> Table:
@@ -204,8 +304,9 @@ def circle_words(answer: MapAnswer, cell: Cell) -> Sentence | None:
 def _setting_words(answer: MapAnswer, cell: Cell) -> str:
     """The setting of a cell, as "8 axes, period 4 ms"."""
     words = []
-    for direction, value in ((answer.x, cell.x), (answer.y, cell.y)):
-        text = value_text(direction, value)
+    values = answer.values_at(cell)
+    for direction in reversed(answer.directions):
+        text = value_text(direction, values[direction.key])
         words.append(f"{text} axes" if direction.key == AXES else f"{title_of(direction, answer.profile)} {text}")
     return ", ".join(words)
 
@@ -258,14 +359,12 @@ def map_document(answer: MapAnswer) -> JsonDocument:
         profile=answer.profile.name,
         timing_model=answer.network.bus.deciding_model,
         x={"key": answer.x.key, "values": list(answer.x.values)},
-        y={"key": answer.y.key, "values": list(answer.y.values)},
+        y=None if answer.y is None else {"key": answer.y.key, "values": list(answer.y.values)},
         with_circle=answer.with_circle,
         design=None if answer.design is None else _record(answer, answer.design),
         regions=[fields(region, *region._fields) for region in answer.regions],
         cells=[_record(answer, cell) for cell in answer.cells],
-        not_drawn=[
-            {answer.x.key: absent.x, answer.y.key: absent.y, "reason": absent.reason} for absent in answer.not_drawn
-        ],
+        not_drawn=[{**answer.values_at(absent), "reason": absent.reason} for absent in answer.not_drawn],
     )
 
 
@@ -273,10 +372,9 @@ def _record(answer: MapAnswer, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
     safety = answer.network.bus.safety.figure
     return {
-        answer.x.key: cell.x,
-        answer.y.key: cell.y,
+        **answer.values_at(cell),
         **fields(cell, "nodes", "axes", "state", "reasons", "binding_term", "verdict"),
-        **fields(cell, "margin_corrected_us", "uncertainty_us"),
+        **fields(cell, "available_us", "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),
         **fields(cell, "circle_passed", "max_contour_error_mm"),
     }
