@@ -17,7 +17,14 @@ from busplan.forms.charts import Drawing
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
+from busplan.questions.base.inputs import (
+    Models,
+    ProfileLike,
+    checked_models,
+    key_changes,
+    load_network,
+    with_its_constants,
+)
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor, summaries
 from busplan.questions.sweep.digest import default_columns, sentences, top_rows
@@ -259,6 +266,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         return Report(Sentence(("Sweep of ", Code(self.profile.name))), (*self.sentences(), *rows), {})
 
 
+@with_its_constants
 def sweep(
     profile: ProfileLike,
     *,
@@ -333,7 +341,14 @@ def sweep(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
     checked = checked_sweep(
-        network, vary, timing_models=models, group=group, circle=circle, summary=summary, unlimited=unlimited
+        network,
+        vary,
+        timing_models=models,
+        group=group,
+        circle=circle,
+        summary=summary,
+        unlimited=unlimited,
+        changes=key_changes({f"constants.{name}": value for name, value in network.profile.constants}),
     )
     return computed(checked, executor=executor, progress=progress)
 
