@@ -8,8 +8,9 @@ from contextvars import ContextVar
 from functools import lru_cache, wraps
 from importlib.resources import files
 from math import nan
+from threading import Event, Lock
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, Final, Literal, NamedTuple, ParamSpec, Self, TypeAlias, TypeVar
+from typing import Any, Final, Literal, NamedTuple, ParamSpec, Self, TypeAlias, TypeVar, cast
 
 Grade = Literal["published", "derived", "recalled", "measured", "calibrated", "assumed"]
 """Grade of a number: how well it is known.
@@ -105,11 +106,29 @@ def constants_changed(changed: ChangedConstants) -> Iterator[None]:
     >>> paper.MAX_HOPS
     16.0
     """
+    if changed:
+        _look_up_each_time()
     token = _CHANGED.set(changed)
     try:
         yield
     finally:
         _CHANGED.reset(token)
+
+
+_LOCK: Final = Lock()
+_EVER_CHANGED: Final = Event()
+"""Until the first change a constant that was looked up is an attribute, which is as fast as a name of a module."""
+_ALL: Final[list["Constants"]] = []
+
+
+def _look_up_each_time() -> None:
+    """From now on look constants up wherever they are used, in all threads."""
+    if not _EVER_CHANGED.is_set():
+        with _LOCK:
+            for constants in _ALL:
+                for name in constants:
+                    vars(constants).pop(name, None)
+            _EVER_CHANGED.set()
 
 
 _Parameters = ParamSpec("_Parameters")
@@ -125,10 +144,10 @@ def cached(maxsize: int) -> Callable[[Callable[_Parameters, _Result]], Callable[
             return function(*given, **named)
 
         @wraps(function)
-        def of_these(*given: _Parameters.args, **named: _Parameters.kwargs) -> _Result:
+        def of_these(*given: Any, **named: Any) -> _Result:
             return of_constants(_CHANGED.get(), *given, **named)
 
-        return of_these
+        return cast("Callable[_Parameters, _Result]", of_these)
 
     return kept
 
@@ -156,6 +175,8 @@ class Constants(Mapping[str, Sourced]):
     """
 
     def __init__(self, package: str, *names: str) -> None:
+        with _LOCK:
+            _ALL.append(self)
         self.fixed: dict[str, str] = {}
         """Why a constant cannot be changed, by name."""
         self._own: dict[str, Sourced] = {}
@@ -172,10 +193,16 @@ class Constants(Mapping[str, Sourced]):
         return self._numbers(_CHANGED.get())[name]
 
     def __getattr__(self, name: str) -> Sourced:
+        # Reached only where the instance has no such attribute.
+        changed = _CHANGED.get()
         try:
-            return self._numbers(_CHANGED.get())[name]
+            number = (self._versions.get(changed) or self._numbers(changed))[name]
         except KeyError:
             raise AttributeError(f"no constant {name}") from None
+        with _LOCK:
+            if not _EVER_CHANGED.is_set():
+                vars(self)[name] = number
+        return number
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._own)

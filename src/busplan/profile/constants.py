@@ -61,10 +61,8 @@ def _name(written: str, kind: str | None, typed: str) -> str:
     every = _known(kind_names())
     name = every.get(written.upper())
     if name is None:
-        known = every if kind is None else _known([kind])
-        raise BusplanError(
-            f"{typed}: no constant of this name; {did_you_mean(written.upper(), known) or '`busplan explain PROFILE` lists them'}"
-        )
+        near = did_you_mean(written.upper(), every if kind is None else _known([kind]))
+        raise BusplanError(f"{typed}: no constant of this name; {near or '`busplan explain PROFILE` lists them'}")
     if kind is not None and name not in kind_named(kind).constants:
         raise BusplanError(f"{typed}: no constant of {kind_named(kind).title}, the bus of this profile")
     for bus in map(kind_named, [kind] if kind else kind_names()):

@@ -188,6 +188,9 @@ class Ieee1394TableExecution(TableExecution, FittedExecution):
     """Section [node.execution] of kind "table": measured times, linear between them, nothing beyond them."""
 
 
+_HoldUs = Annotated[float, Field(ge=0, le=float(c.unchanged["ARBITRATION_HOLD_US"]), allow_inf_nan=False)]
+
+
 class Ieee1394Node(NodeSection):
     """Section [node]: a distributed node, and how it answers."""
 
@@ -205,13 +208,11 @@ class Ieee1394Node(NodeSection):
         description="How a node answers a write: split, it sends a response; unified, its acknowledge is the answer",
         examples=["unified"],
     )
-    response_us: Annotated[float, Field(ge=0, le=float(c.unchanged["ARBITRATION_HOLD_US"]), allow_inf_nan=False)] = (
-        Field(
-            default_factory=lambda: float(c.ARBITRATION_HOLD_US),
-            description="Time from the acknowledge to a concatenated response; hardware slower than MAX_BUS_HOLD, 1.63 us "
-            "(recalled), answers split. Used only for concatenated answers [us]",
-            examples=[0.5],
-        )
+    response_us: _HoldUs = Field(
+        default_factory=lambda: float(c.ARBITRATION_HOLD_US),
+        description="Time from the acknowledge to a concatenated response; hardware slower than MAX_BUS_HOLD, 1.63 us "
+        "(recalled), answers split. Used only for concatenated answers [us]",
+        examples=[0.5],
     )
 
 

@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
-from typing import Any, Concatenate, Final, ParamSpec, TypeVar
+from typing import Any, Final, ParamSpec, TypeVar, cast
 
 from busplan.buses.network import Network
 from busplan.english import listed
@@ -71,18 +71,18 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
 
 
 def with_its_constants(
-    question: Callable[Concatenate[ProfileLike, _Parameters], _Answer],
-) -> Callable[Concatenate[ProfileLike, _Parameters], _Answer]:
+    question: Callable[_Parameters, _Answer],
+) -> Callable[_Parameters, _Answer]:
     """Decorator of a question: it is given the loaded profile, and computes with the constants changed in that."""
 
     @wraps(question)
-    def asked(profile: ProfileLike, *given: _Parameters.args, **named: _Parameters.kwargs) -> _Answer:
+    def asked(profile: ProfileLike, *given: Any, **named: Any) -> _Answer:
         with constants_changed(()):
             loaded = load_profile(profile)
         with constants_changed(loaded.constants):
             return question(loaded, *given, **named)
 
-    return asked
+    return cast("Callable[_Parameters, _Answer]", asked)
 
 
 def load_network(profile: ProfileLike) -> Network:
