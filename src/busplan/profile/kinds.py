@@ -343,7 +343,7 @@ def profile_schema() -> dict[str, Any]:
     class WithConstants(GenerateJsonSchema):
         def get_default_value(self, schema: Any) -> Any:
             """The default of a key, also where it is a constant."""
-has_one = "default_factory" in schema and not schema.get("default_factory_takes_data")
+            has_one = "default_factory" in schema and not schema.get("default_factory_takes_data")
             made = schema["default_factory"]() if has_one else None
             return made if isinstance(made, int | float) else super().get_default_value(schema)
 
