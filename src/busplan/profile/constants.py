@@ -46,7 +46,8 @@ def constants_of(changes: Mapping[str, object], kind: str | None, origin: Mappin
             name = _name(key.partition(".")[2], kind, typed)
             if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
                 raise BusplanError(f"{typed}: expected a finite number")
-            if value <= 0:
+            own = next(bus.constants[name] for bus in map(kind_named, kind_names()) if name in bus.constants)
+            if own >= 0 and (value < 0 or value == 0 < own):
                 raise BusplanError(f"{typed}: expected a number above 0; a tiny one says that there is none")
             constants[name] = float(value)
         elif "." not in key and (name := _known([kind] if kind else kind_names()).get(key.upper(), "")):
