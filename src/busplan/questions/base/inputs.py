@@ -75,12 +75,14 @@ def with_its_constants(
 ) -> Callable[_Parameters, _Answer]:
     """Decorator of a question: it is given the loaded profile, and computes with the constants changed in that."""
 
+    of_loaded: Callable[..., _Answer] = question
+
     @wraps(question)
     def asked(profile: ProfileLike, *given: Any, **named: Any) -> _Answer:
         with constants_changed(()):
             loaded = load_profile(profile)
         with constants_changed(loaded.constants):
-            return question(loaded, *given, **named)
+            return of_loaded(loaded, *given, **named)
 
     return cast("Callable[_Parameters, _Answer]", asked)
 
