@@ -163,7 +163,7 @@ class Constants(Mapping[str, Sourced]):
     Parameters
     ----------
     package
-        The package that the files lie in.
+        The package that the files lie in; without it there are no constants.
     names
         Names of the files; `constants.toml` without any.
 
@@ -174,7 +174,7 @@ class Constants(Mapping[str, Sourced]):
     (16.0, 'paper, section I; IEEE project page', 'DATA_RATE_MBIT_S[S100]')
     """
 
-    def __init__(self, package: str, *names: str) -> None:
+    def __init__(self, package: str = "", *names: str) -> None:
         with _LOCK:
             _ALL.append(self)
         self.fixed: dict[str, str] = {}
@@ -183,7 +183,7 @@ class Constants(Mapping[str, Sourced]):
         self._formulas: dict[str, Callable[[Any], float]] = {}
         self._versions: dict[ChangedConstants, dict[str, Sourced]] = {}
         self._tables: dict[tuple[ChangedConstants, str], Mapping[str, Sourced]] = {}
-        for file in names or ("constants.toml",):
+        for file in (names or ("constants.toml",)) if package else ():
             for name, words in _entries("", read_toml(package, file)):
                 if why := words.pop("fixed", ""):
                     self.fixed[name] = why

@@ -70,7 +70,7 @@ class Bus(ABC):
     """Kinds of a sequence of events, such as a transaction or a frame."""
     rate_keys: ClassVar[tuple[str, ...]] = ()
     """Bit rates that a profile gives [kbit/s]: all times on the wire follow from them."""
-    constants: ClassVar[Constants]
+    constants: ClassVar[Constants] = Constants()
     """Its constants, each with its source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}
     """Facts about the kind's own keys, by dotted key; those of [[group]] stand under `node.` or `payload.`."""

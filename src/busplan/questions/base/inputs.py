@@ -74,7 +74,6 @@ def with_its_constants(
     question: Callable[_Parameters, _Answer],
 ) -> Callable[_Parameters, _Answer]:
     """Decorator of a question: it is given the loaded profile, and computes with the constants changed in that."""
-
     of_loaded: Callable[..., _Answer] = question
 
     @wraps(question)
