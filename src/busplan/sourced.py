@@ -1,13 +1,16 @@
 """Numbers and equations with their sources, numbers with a grade of certainty, and inputs of a derivation."""
 
-import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import lru_cache, wraps
 from importlib.resources import files
 from math import nan
-from types import MappingProxyType
-from typing import Any, Final, Literal, NamedTuple, Self, TypeVar
+from threading import Event, Lock
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, Final, Literal, NamedTuple, ParamSpec, Self, TypeAlias, TypeVar, cast
 
 Grade = Literal["published", "derived", "recalled", "measured", "calibrated", "assumed"]
 """Grade of a number: how well it is known.
@@ -80,56 +83,187 @@ def read_toml(package: str, name: str) -> dict[str, Any]:
     return tomllib.loads((files(package) / name).read_text(encoding="utf-8"))
 
 
-CHANGED_CONSTANTS: Final = "BUSPLAN_CONSTANTS"
-"""Environment variable with other values of constants, as NAME=VALUE;NAME=VALUE, read when a kind of bus is loaded."""
+ChangedConstants: TypeAlias = tuple[tuple[str, float], ...]
+"""Other values of constants by name."""
+_CHANGED: Final[ContextVar[ChangedConstants]] = ContextVar("changed constants", default=())
 
 
-def _as_changed(number: Sourced) -> Sourced:
-    """A constant, or the value that the environment gives it, which is assumed."""
-    pairs = (pair.partition("=") for pair in os.environ.get(CHANGED_CONSTANTS, "").split(";"))
-    value = next((value for name, _, value in pairs if name == number.name), None)
-    if value is None:
-        return number
-    words = {slot: getattr(number, slot) for slot in Sourced.__slots__}
-    return Sourced(float(value), **{**words, "grade": "assumed", "source": f"changed, was {number:g}: {number.source}"})
+def changed_constants() -> ChangedConstants:
+    """Other values of constants that hold where this is called."""
+    return _CHANGED.get()
 
 
-class Constants(dict[str, Sourced]):
-    """Sourced constants of a kind of bus by name, in the order of their TOML files.
+@contextmanager
+def constants_changed(changed: ChangedConstants) -> Iterator[None]:
+    """Compute with these other values of constants, and no others; each thread has its own.
+
+    Examples
+    --------
+    >>> paper = Constants("busplan.buses.ieee1394")
+    >>> with constants_changed((("MAX_HOPS", 8.0),)):
+    ...     paper.MAX_HOPS, paper.MAX_HOPS.grade
+    (8.0, 'assumed')
+    >>> paper.MAX_HOPS
+    16.0
+    """
+    if changed:
+        _look_up_each_time()
+    token = _CHANGED.set(changed)
+    try:
+        yield
+    finally:
+        _CHANGED.reset(token)
+
+
+_LOCK: Final = Lock()
+_EVER_CHANGED: Final = Event()
+"""Until the first change a constant that was looked up is an attribute, which is as fast as a name of a module."""
+_ALL: Final[list["Constants"]] = []
+
+
+def _look_up_each_time() -> None:
+    """From now on look constants up wherever they are used, in all threads."""
+    if not _EVER_CHANGED.is_set():
+        with _LOCK:
+            for constants in _ALL:
+                for name in constants:
+                    vars(constants).pop(name, None)
+            _EVER_CHANGED.set()
+
+
+_Parameters = ParamSpec("_Parameters")
+_Result = TypeVar("_Result")
+
+
+def cached(maxsize: int) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
+    """Decorator as `lru_cache`, for a function that computes with constants: other values have other results."""
+
+    def kept(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
+        @lru_cache(maxsize)
+        def of_constants(_: ChangedConstants, *given: Any, **named: Any) -> _Result:
+            return function(*given, **named)
+
+        @wraps(function)
+        def of_these(*given: Any, **named: Any) -> _Result:
+            return of_constants(_CHANGED.get(), *given, **named)
+
+        return cast("Callable[_Parameters, _Result]", of_these)
+
+    return kept
+
+
+class Constants(Mapping[str, Sourced]):
+    """Sourced constants of a kind of bus by name, in the order of their TOML files; attributes, too.
 
     A table `[NAME]` has the value and the words of one constant, `[NAME.KEY]` one of several by key; it is called
     NAME[KEY]. A table in small letters is a group. What stands in a group, or in `[NAME]` beside keys, holds for
-    all of it. Python computes what has no value.
+    all of it. Python computes what has no value. A constant is looked up where it is used, for `constants_changed` may
+    give it another value; one with `fixed`, the reason, keeps its own.
 
     Parameters
     ----------
     package
-        The package that the files lie in.
+        The package that the files lie in; without it there are no constants.
     names
         Names of the files; `constants.toml` without any.
 
     Examples
     --------
     >>> paper = Constants("busplan.buses.ieee1394")
-    >>> paper["MAX_HOPS"], paper["MAX_HOPS"].source, paper.by_key("DATA_RATE_MBIT_S")["S100"].name
+    >>> paper.MAX_HOPS, paper.MAX_HOPS.source, paper.by_key("DATA_RATE_MBIT_S")["S100"].name
     (16.0, 'paper, section I; IEEE project page', 'DATA_RATE_MBIT_S[S100]')
     """
 
-    def __init__(self, package: str, *names: str) -> None:
-        for file in names or ("constants.toml",):
+    def __init__(self, package: str = "", *names: str) -> None:
+        with _LOCK:
+            _ALL.append(self)
+        self.fixed: dict[str, str] = {}
+        """Why a constant cannot be changed, by name."""
+        self._own: dict[str, Sourced] = {}
+        self._formulas: dict[str, Callable[[Any], float]] = {}
+        self._versions: dict[ChangedConstants, dict[str, Sourced]] = {}
+        self._tables: dict[tuple[ChangedConstants, str], Mapping[str, Sourced]] = {}
+        for file in (names or ("constants.toml",)) if package else ():
             for name, words in _entries("", read_toml(package, file)):
-                self[name] = _as_changed(Sourced(**{"value": nan, **words}, name=name))
+                if why := words.pop("fixed", ""):
+                    self.fixed[name] = why
+                self._own[name] = Sourced(**{"value": nan, **words}, name=name)
 
-    def computed(self, name: str, value: float) -> Sourced:
-        """Give a constant the value that its file leaves to Python."""
-        number = Sourced(value, **{slot: getattr(self[name], slot) for slot in Sourced.__slots__})
-        self[name] = _as_changed(number)
-        return self[name]
+    def __getitem__(self, name: str) -> Sourced:
+        return self._numbers(_CHANGED.get())[name]
+
+    def __getattr__(self, name: str) -> Sourced:
+        # Reached only where the instance has no such attribute.
+        changed = _CHANGED.get()
+        try:
+            number = (self._versions.get(changed) or self._numbers(changed))[name]
+        except KeyError:
+            raise AttributeError(f"no constant {name}") from None
+        with _LOCK:
+            if not _EVER_CHANGED.is_set():
+                vars(self)[name] = number
+        return number
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._own)
+
+    def __len__(self) -> int:
+        return len(self._own)
+
+    @property
+    def unchanged(self) -> Mapping[str, Sourced]:
+        """The constants as they are published, whatever is changed: for what holds of every call, as a schema does."""
+        return MappingProxyType(self._numbers(()))
+
+    def computed(self, name: str, formula: Callable[[Any], float]) -> None:
+        """Give a constant the value that its file leaves to Python: a formula of the constants, by attribute."""
+        self._formulas[name] = formula
+        self._versions.clear()
+        self._tables.clear()
 
     def by_key(self, name: str) -> Mapping[str, Sourced]:
         """Constants of one name by key."""
-        start = f"{name}["
-        return MappingProxyType({key[len(start) : -1]: number for key, number in self.items() if key.startswith(start)})
+        changed = _CHANGED.get()
+        table = self._tables.get((changed, name))
+        if table is None:
+            start, numbers = f"{name}[", self._numbers(changed)
+            of_name = {key[len(start) : -1]: number for key, number in numbers.items() if key.startswith(start)}
+            table = self._tables[changed, name] = MappingProxyType(of_name)
+        return table
+
+    def _numbers(self, changed: ChangedConstants) -> dict[str, Sourced]:
+        """All constants with other values, and what is computed of these."""
+        if changed in self._versions:
+            return self._versions[changed]
+        values = {name: value for name, value in changed if name not in self.fixed}
+        numbers = {name: _as_changed(number, values.get(name)) for name, number in self._own.items()}
+        for name, formula in self._formulas.items():
+            value = formula(SimpleNamespace(**numbers))
+            number = _with(self._own[name], value)
+            if changed and value != (before := self._numbers(())[name]):
+                number = _as_changed(_with(number, before), value)
+            numbers[name] = _as_changed(number, values.get(name))
+        if len(self._versions) >= _KEPT:
+            self._versions.clear()
+            self._tables.clear()
+        self._versions[changed] = numbers
+        return numbers
+
+
+_KEPT: Final = 64
+"""Most sets of changed constants that are kept."""
+
+
+def _with(number: Sourced, value: float, **other: str) -> Sourced:
+    words = {slot: getattr(number, slot) for slot in Sourced.__slots__}
+    return Sourced(value, **{**words, **other})
+
+
+def _as_changed(number: Sourced, value: float | None) -> Sourced:
+    """A constant, or with another value, which is assumed."""
+    if value is None:
+        return number
+    return _with(number, value, grade="assumed", source=f"changed, was {number:g}: {number.source}")
 
 
 def _entries(name: str, table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -177,8 +311,8 @@ def input_of(number: Sourced) -> Input:
 
     Examples
     --------
-    >>> from busplan.buses.ieee1394.constants import DATA_END_US
-    >>> input_of(DATA_END_US)[:4]
+    >>> from busplan.buses.ieee1394.constants import c
+    >>> input_of(c.DATA_END_US)[:4]
     ('0.25', 'DATA_END_US', 0.25, 'us')
     """
     value = float(number)

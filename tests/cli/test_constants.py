@@ -8,13 +8,21 @@ from typing import Any
 
 import pytest
 
+import busplan
+
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 
 
 def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    """The program in a process of its own: constants are read when it starts."""
+    """The program in a process of its own, with a variable of the environment that changed figures once."""
     command = [sys.executable, "-c", "from busplan.__main__ import main; main()", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False, env={"PYTHONPATH": str(SOURCE)})
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={"PYTHONPATH": str(SOURCE), "BUSPLAN_CONSTANTS": "ARBITRATION_HOLD_US=99;GAPS_TICKS=abc"},
+    )
 
 
 def result(*options: str) -> Any:
@@ -43,6 +51,9 @@ def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
         ("constants.arbitration_hold=2", "no constant of this name; did you mean ARBITRATION_HOLD_US?"),
         ("constants.arbitration_hold_us=long", "expected a finite number"),
         ("constants.arbitration_hold_us=nan", "expected a finite number"),
+        ("constants.base_rate_mbit_s=0", "expected a number above 0"),
+        ("BASE_RATE_MBIT_S=1000", "no key of a profile; did you mean constants.BASE_RATE_MBIT_S?"),
+        ("constants.EQ15_CONSTANT_US=3", "cannot be changed: equation (15) is tested as it is printed"),
     ],
 )
 def test_what_is_no_constant_is_refused(text: str, words: str) -> None:
@@ -57,3 +68,17 @@ def test_compare_takes_a_constant_of_any_kind() -> None:
         for more in ((), ("--set", "constants.arbitration_hold_us=2.63"))
     )
     assert changed > plain
+
+
+def test_a_table_s_constant_is_named_by_its_key_and_csv_names_it() -> None:
+    typed = "constants.DATA_RATE_MBIT_S[s400]=200"
+    done = run("capacity", "paper-4ms", "--format", "csv", "--set", typed)
+    head, first, *_ = done.stdout.splitlines()
+    assert head.endswith(",changed_constants")
+    assert first.endswith("," + typed.replace("=200", "=200"))
+    assert "changed_constants" not in run("capacity", "paper-4ms", "--format", "csv").stdout
+
+
+def test_the_environment_changes_no_figure() -> None:
+    document = busplan.capacity("paper-4ms").to_dict()
+    assert result() == document

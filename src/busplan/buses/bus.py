@@ -35,7 +35,7 @@ from busplan.buses.rule import Recorded, Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
-from busplan.sourced import Sourced
+from busplan.sourced import Constants
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -70,7 +70,7 @@ class Bus(ABC):
     """Kinds of a sequence of events, such as a transaction or a frame."""
     rate_keys: ClassVar[tuple[str, ...]] = ()
     """Bit rates that a profile gives [kbit/s]: all times on the wire follow from them."""
-    constants: ClassVar[Mapping[str, Sourced]] = {}
+    constants: ClassVar[Constants] = Constants()
     """Its constants, each with its source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}
     """Facts about the kind's own keys, by dotted key; those of [[group]] stand under `node.` or `payload.`."""

@@ -11,7 +11,7 @@ from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject, told_apart
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain, smaller
-from busplan.sourced import Grade, Sourced
+from busplan.sourced import Grade
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -47,8 +47,8 @@ class Key(NamedTuple):
 
     symbol: str = ""
     """Symbol in formulas, if not its name."""
-    default: Sourced | None = None
-    """Its default, if that is a constant with a source."""
+    default: str = ""
+    """Name of the constant that is its default."""
     grade: Grade | None = None
     """Best grade that its value can have, if below the grade "given"."""
     meaning: str = ""
@@ -104,7 +104,8 @@ class Limit(NamedTuple):
     period: "Callable[[Limit, Network], Number] | None" = None
     """Shortest period that keeps the limit, for a network [us]; None where a longer period does not help."""
     way_out: str = ""
-    """Advice for a network that has no room for more nodes because of this limit."""
+    """Advice for a network that has no room for more nodes because of this limit: a format with `most`, and with the
+    constants of the kind as `c`."""
     role: Literal["cycle", "safety", "period"] = "cycle"
     """cycle: a part of the verdict. safety: not a part of the verdict, but no advice breaks it. period: depends on the
     period alone, and a plan chooses no period that breaks it."""
@@ -153,6 +154,14 @@ class Limit(NamedTuple):
     def shortest_period_us(self, network: Network) -> Number:
         """Shortest period that keeps it; infinite where no longer one does [us]."""
         return inf if self.period is None else self.period(self, network)
+
+    def advice(self, network: Network) -> str:
+        """`way_out` for a network."""
+        return (
+            self.way_out.format(most=self.most(network), c=network.bus.constants)
+            if "{" in self.way_out
+            else self.way_out
+        )
 
     def words(self, network: Network) -> str:
         """Say by how much a network breaks it."""
@@ -394,7 +403,7 @@ def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
         yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
 
 
-def nodes_limit(nodes: str, most: float, bus: str, *, of: str = "of a", has_rule: bool = False) -> Limit:
+def nodes_limit(nodes: str, most: Callable[[], float], bus: str, *, of: str = "of a", has_rule: bool = False) -> Limit:
     """The limit on the nodes of a bus.
 
     Parameters
@@ -402,14 +411,14 @@ def nodes_limit(nodes: str, most: float, bus: str, *, of: str = "of a", has_rule
     nodes, bus
         What they are called.
     most
-        The most nodes of a bus [1].
+        Function that gives the most nodes of a bus [1].
     of
         Words between the number and the bus.
     has_rule
         As `Limit` has it.
     """
-    over, way_out = f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}", f"a second {bus} has {most:g} more"
-    return Limit("nodes", over, lambda network: network.nodes, lambda _: most, way_out=way_out, has_rule=has_rule)
+    over, way_out = f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}", f"a second {bus} has {{most:g}} more"
+    return Limit("nodes", over, lambda network: network.nodes, lambda _: most(), way_out=way_out, has_rule=has_rule)
 
 
 NODE: Final = "node"

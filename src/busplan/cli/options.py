@@ -15,7 +15,7 @@ import typer
 from busplan.errors import BusplanError
 from busplan.extras import require_resvg
 from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
-from busplan.profile.changes import SET, KeyChange, KeyChanges, in_unit, parse_set, require_separate, use_constants
+from busplan.profile.changes import SET, KeyChange, KeyChanges, in_unit, parse_set, require_separate
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
@@ -324,12 +324,14 @@ def takes_changes(words: str = "", *, period: bool = False) -> Callable[[Callabl
             text = given.pop("period") if period else None
             made = () if text is None else (_period_change(text),)
             changes = KeyChanges((*made, *parse_set(set_ or ())))
-            use_constants(changes)
             # Periods to compute, such as 4ms, beside a change of the period.
             for computed, change in product(given.get("period") or (), changes.entries):
                 if change.key == _PERIOD:
                     require_separate(change, _PERIOD, typed=f"--period {computed}")
-            command(*arguments, changes=changes, **given)
+            from busplan.sourced import constants_changed
+
+            with constants_changed(changes.changed_constants):
+                command(*arguments, changes=changes, **given)
 
         # Typer reads the options of a command from its signature; without it every command would list these two.
         with_changes.__signature__ = written.replace(parameters=parameters)  # type: ignore[attr-defined]

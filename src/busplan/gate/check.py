@@ -23,6 +23,7 @@ from busplan.profile.sources import Collection, ProfileSource, collect
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
 from busplan.sections.profile import Profile
+from busplan.sourced import changed_constants, constants_changed
 
 NO_FILES: Final[Mapping[str, Sequence[str]]] = MappingProxyType({})
 
@@ -130,6 +131,7 @@ def check(
     (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0, suppressed=3))
     """
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
+    _ = changed.changed_constants  # refuses those that no kind of bus has, for all files at once
     recorded = None if baseline is None else _recorded(baseline)
     collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
     if recording is not None and len(collection.sources) + len(profiles) != 1:
@@ -155,8 +157,15 @@ def check(
     is_here = [executor is None or isinstance(file, Document) or str(file.path) == "-" for file in files]
     there = [pair for pair, here in zip(zip(files, records, strict=True), is_here, strict=True) if not here]
     checked = executor.map(check_file, *zip(*there, strict=True)) if executor is not None and there else iter(())
+    # What is in memory keeps the constants that were changed in it.
+    of_memory = dict(zip(map(id, in_memory), (profile.constants for profile in profiles), strict=True))
+
+    def checked_here(file: ProfileSource | Document, record: Any) -> FileResult:
+        with constants_changed(of_memory.get(id(file), changed_constants())):
+            return check_file(file, record)
+
     results = [
-        check_file(file, record) if here else next(checked)
+        checked_here(file, record) if here else next(checked)
         for file, record, here in zip(files, records, is_here, strict=True)
     ]
     unmatched = "" if recorded is None else _unmatched(recorded, names, results)

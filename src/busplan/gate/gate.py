@@ -33,6 +33,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Document, LoadedProfile, Spot, decode, read_bytes, validate
 from busplan.profile.kinds import path_of
 from busplan.profile.sources import ProfileSource
+from busplan.sourced import constants_changed
 
 MARK: Final = "busplan:"
 _MARKED_COMMENT: Final = re.compile(r"#\s*busplan:")
@@ -187,6 +188,11 @@ def check_source(
     options
         Named arguments of `check_document`.
     """
+    with constants_changed(options.get("changes", NO_CHANGES).changed_constants):
+        return _check_source(source, recorded, options)
+
+
+def _check_source(source: ProfileSource | Document, recorded: Record | None, options: Mapping[str, Any]) -> FileResult:
     if isinstance(source, Document):
         return check_document(source, baseline=recorded, **options)
     if source.failure is not None:

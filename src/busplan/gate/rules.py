@@ -36,7 +36,7 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     broken = limits_behind(deciding, subject.network)
     unreported = [limit for limit in broken if not limit.has_rule]
     for limit in unreported:
-        yield RuleProblem(limit.place, limit.words(subject.network), limit.way_out)
+        yield RuleProblem(limit.place, limit.words(subject.network), limit.advice(subject.network))
     if not unreported and (TIME in deciding.exceeded or not broken):
         yield RuleProblem("cycle.period_us", f"the cycle {overrun(deciding)}", *subject.cure())
 
@@ -49,7 +49,7 @@ def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     for limit in limits_behind(deciding, subject.network):
         if not limit.has_rule:
             words = limit.words(subject.network)
-            yield RuleProblem(limit.place, f"not shown to fit: {words}", limit.way_out)
+            yield RuleProblem(limit.place, f"not shown to fit: {words}", limit.advice(subject.network))
     if TIME in (deciding.not_shown or ()):
         words = overrun(deciding)
         if reserve:
@@ -98,7 +98,7 @@ def _spare(counts: Any, spare: int, least: int) -> str:
 def _room(subject: RuleSubject, counts: Any) -> Mending:
     """How to make room for more nodes."""
     limit = subject.network.bus.limit(counts.safe_limited_by)
-    return subject.cure() if limit is None or limit.role == "safety" else Mending(limit.way_out)
+    return subject.cure() if limit is None or limit.role == "safety" else Mending(limit.advice(subject.network))
 
 
 def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:

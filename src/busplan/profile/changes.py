@@ -7,20 +7,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import combinations
-from math import isfinite
 from string import ascii_letters, digits
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from busplan.english import did_you_mean, has_controls, listed
+from busplan.english import has_controls, listed
 from busplan.errors import BusplanError, PlacedError
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
+    from busplan.sourced import ChangedConstants
 
 SET: Final = "--set"
 CONSTANTS: Final = "constants"
 """Section of --set for constants of the model: constants.ARBITRATION_HOLD_US."""
-_KEY: Final = re.compile(r"[A-Za-z0-9_-]{1,100}(?:\.[A-Za-z0-9_-]{1,100}){0,9}")
+_KEY: Final = re.compile(
+    rf"[A-Za-z0-9_-]{{1,100}}(?:\.[A-Za-z0-9_-]{{1,100}}){{0,9}}|{CONSTANTS}\.[A-Za-z0-9_]{{1,100}}\[[A-Za-z0-9_-]{{1,100}}\]"
+)
 _WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _VALUE: Final = "value"
 UNITS: Final = {
@@ -92,6 +94,25 @@ class KeyChanges:
         return tuple(change for change in self.entries if change.sections[0] == CONSTANTS)
 
     @property
+    def changed_constants(self) -> "ChangedConstants":
+        """Other values of constants by name, those that were in force before included.
+
+        Raises
+        ------
+        BusplanError
+            No kind of bus has such a constant, or its value is no finite number.
+        """
+        from busplan.sourced import changed_constants  # noqa: PLC0415 - loads tomllib, which --help does not need
+
+        if not self.constants:
+            return changed_constants()
+        from busplan.profile.constants import constants_of  # noqa: PLC0415 - loads all kinds of bus
+
+        new = {change.key: change.value for change in self.constants}
+        named = constants_of(new, None, {change.key: change.typed for change in self.constants})
+        return tuple(sorted((dict(changed_constants()) | named).items()))
+
+    @property
     def by_set(self) -> tuple[KeyChange, ...]:
         """Changes by --set; those by another option show in every answer."""
         return tuple(change for change in self.entries if change.option == SET)
@@ -118,46 +139,13 @@ class KeyChanges:
         BusplanError
             The profile's schema refuses them; each problem names its option. Or its bus has no such constant.
         """
-        if self.constants:
-            from busplan.buses import kind_named  # noqa: PLC0415 - a kind of bus reads its constants when it is loaded
-
-            bus = kind_named(profile.bus.kind)
-            for change in self.constants:
-                if change.sections[-1].upper() not in bus.constants:
-                    raise BusplanError(f"{change.typed}: no constant of {bus.title}, the bus of this profile")
         from busplan.profile.document import override  # noqa: PLC0415 - loads pydantic, which --help does not need
 
         return override(
-            profile, self.values, origin={change.key: f"{change.typed}{change.note}" for change in self.entries}
+            profile,
+            {change.key: change.value for change in self.entries},
+            origin={change.key: f"{change.typed}{change.note}" for change in self.entries},
         )
-
-
-def use_constants(changes: KeyChanges) -> None:
-    """Use other values of constants in this process and in those that it starts; before a kind of bus is loaded.
-
-    Raises
-    ------
-    BusplanError
-        There is no such constant, or its value is no number.
-    """
-    if not changes.constants:
-        return
-    values = {change.sections[-1].upper(): change for change in changes.constants}
-    for change in values.values():
-        if not isinstance(change.value, int | float) or isinstance(change.value, bool) or not isfinite(change.value):
-            raise BusplanError(f"{change.typed}: expected a finite number")
-    from busplan.sourced import CHANGED_CONSTANTS  # noqa: PLC0415 - loads tomllib, which --help does not need
-
-    os.environ[CHANGED_CONSTANTS] = ";".join(f"{name}={change.value}" for name, change in values.items())
-    from busplan.buses import kind_named, kind_names  # noqa: PLC0415 - they read their constants when they are loaded
-
-    known = {name: number for kind in kind_names() for name, number in kind_named(kind).constants.items()}
-    for name, change in values.items():
-        if name not in known:
-            hint = did_you_mean(name, known) or "`busplan explain PROFILE` lists them"
-            raise BusplanError(f"{change.typed}: no constant of this name; {hint}")
-        if known[name] != change.value:
-            raise BusplanError(f"{change.typed}: constants were read already; run it in a new process")
 
 
 NO_CHANGES: Final = KeyChanges()

@@ -14,11 +14,12 @@ from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.files import is_unwritten_pipe
+from busplan.profile.constants import constants_of, is_constant
 from busplan.profile.kinds import holder, kind_of, named_path, profile_model
 from busplan.profile.machine_files import matching
 from busplan.profile.places import KeyPath, Lines, Place, comments, places
 from busplan.sections.profile import Profile
-from busplan.sourced import Grade
+from busplan.sourced import Grade, constants_changed
 
 GRADING: Final = re.compile(rf"#\s*({'|'.join(get_args(Grade))})\b")
 """A comment that grades the key beside it: `master_us = 30  # measured: on the line's own host`."""
@@ -334,7 +335,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     profile
         The profile.
     changes
-        New value by dotted key: {"bus.nodes": 3}.
+        New value by dotted key: {"bus.nodes": 3}; or of a constant of its bus, as `constants.NAME`.
     origin
         What set a key, for messages, if it is not key and value: {"bus.nodes": "--nodes 3"}.
 
@@ -346,12 +347,16 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     if not changes:
         return profile
     origin = origin or {}
-    kept = _unchanged_tables(profile, changes.keys())
+    constants = constants_of(changes, profile.bus.kind, origin)
+    changes = {key: value for key, value in changes.items() if not is_constant(key)}
+    # Defaults may be constants.
+    kept = {} if constants else _unchanged_tables(profile, changes.keys())
     data = profile.model_dump(exclude_unset=True, exclude=set(kept))
     for key, value in changes.items():
         table, last = holder(data, key, name=origin.get(key))
         table[last] = value
-    result = _checked(data | kept)
+    with constants_changed(tuple(sorted((dict(profile.constants) | constants).items()))):
+        result = _checked(data | kept)
     if isinstance(result, Profile):
         if _SOURCE in profile.__dict__:
             document, before = profile.__dict__[_SOURCE]

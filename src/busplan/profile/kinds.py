@@ -338,10 +338,19 @@ def profile_schema() -> dict[str, Any]:
     >>> profile_schema()["properties"]["bus"]["properties"]["kind"]["enum"][:2]
     ['ieee1394', 'can']
     """
-    from pydantic.json_schema import models_json_schema  # noqa: PLC0415 - one command alone needs it
+    from pydantic.json_schema import GenerateJsonSchema, models_json_schema  # noqa: PLC0415 - one command alone needs it
+
+    class WithConstants(GenerateJsonSchema):
+        def get_default_value(self, schema: Any) -> Any:
+            """The default of a key, also where it is a constant."""
+            has_one = "default_factory" in schema and not schema.get("default_factory_takes_data")
+            made = schema["default_factory"]() if has_one else None
+            return made if isinstance(made, int | float) else super().get_default_value(schema)
 
     kinds = {kind: profile_model(kind) for kind in kind_names()}
-    references, definitions = models_json_schema([(model, "validation") for model in kinds.values()])
+    references, definitions = models_json_schema(
+        [(model, "validation") for model in kinds.values()], schema_generator=WithConstants
+    )
     # With conditions, validators name the wrong key; with a union, they would say that no member matches.
     chosen = [
         {"if": _has_kind({"const": kind}), "then": references[model, "validation"]} for kind, model in kinds.items()

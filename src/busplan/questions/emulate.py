@@ -13,7 +13,7 @@ from busplan.english import did_you_mean, listed, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Code, Report, Sentence
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, finite, load_network, whole
+from busplan.questions.base.inputs import ProfileLike, finite, load_network, whole, with_its_constants
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
@@ -67,6 +67,7 @@ class EmulateAnswer(Answer):
         return Report(Sentence(("Emulated ", Code(name))), lines, content, with_profile(name, records))
 
 
+@with_its_constants
 def emulate(
     profile: ProfileLike,
     *,

@@ -22,7 +22,15 @@ from busplan.forms.blocks import (
     attribute_value,
 )
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network, one_or_several, whole
+from busplan.questions.base.inputs import (
+    Models,
+    ProfileLike,
+    checked_models,
+    load_network,
+    one_or_several,
+    whole,
+    with_its_constants,
+)
 from busplan.questions.base.sentences import (
     FigureColumn,
     document,
@@ -92,6 +100,7 @@ class LatencyAnswer(Answer):
         return f"{self.profile.name}: {self.subject}"
 
 
+@with_its_constants
 def latency(
     profile: ProfileLike,
     *,

@@ -30,7 +30,7 @@ from busplan.forms.blocks import (
 from busplan.profile.edit import value_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, ProfileLike, finite, load_profile
+from busplan.questions.base.inputs import Path, ProfileLike, finite, load_profile, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
@@ -131,6 +131,7 @@ class MeasuredAnswer(Answer):
         )
 
 
+@with_its_constants
 def measured(
     profile: ProfileLike,
     recording: Path,

@@ -7,7 +7,7 @@ for a float.
 from collections.abc import Callable, Collection, Iterator
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from busplan.english import has_controls
 from busplan.sections.base import MISSING, TRANSACTION_KINDS, Problem, Section, refused
@@ -28,6 +28,7 @@ from busplan.sections.machine import (
     ServoSection,
     ToleranceSection,
 )
+from busplan.sourced import ChangedConstants, changed_constants
 
 SCHEMA_VERSION: Final = 1
 
@@ -83,6 +84,13 @@ class Profile(Section):
     circle: CircleSection = Field(default_factory=CircleSection, description="The circle of the test")
     limits: Limits = Field(default_factory=Limits, description="What the gate asks for beyond fitting")
     tolerance: ToleranceSection = Field(default_factory=ToleranceSection, description="What the circle test must hold")
+
+    _constants: ChangedConstants = PrivateAttr(default_factory=changed_constants)
+
+    @property
+    def constants(self) -> ChangedConstants:
+        """Other values of constants, which its figures are computed with: those that held when it was validated."""
+        return self._constants
 
     @property
     def asks_for_circle(self) -> bool:

@@ -35,9 +35,11 @@ def test_a_bus_without_hops_is_an_error(hops: int) -> None:
 
 def test_rates_and_limits_by_speed() -> None:
     speeds = [f"S{100 * 2**power}" for power in range(6)]
-    assert dict(ieee1394.DATA_RATE_MBIT_S) == {speed: 98.304 * 2**power for power, speed in enumerate(speeds)}
-    assert dict(ieee1394.MAX_PAYLOAD_BYTES) == {speed: 512 * 2**power for power, speed in enumerate(speeds)}
-    assert (ieee1394.MAX_NODES, ieee1394.MAX_HOPS) == (62.0, 16.0)
+    assert dict(ieee1394.c.by_key("DATA_RATE_MBIT_S")) == {
+        speed: 98.304 * 2**power for power, speed in enumerate(speeds)
+    }
+    assert dict(ieee1394.c.by_key("MAX_PAYLOAD_BYTES")) == {speed: 512 * 2**power for power, speed in enumerate(speeds)}
+    assert (ieee1394.c.MAX_NODES, ieee1394.c.MAX_HOPS) == (62.0, 16.0)
 
 
 @given(st.integers(0, 5000))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.ieee1394.constants import CONSTANTS
+from busplan.buses.ieee1394.constants import c
 from busplan.forms import terminal
 from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.figures import capacity_figures
@@ -217,8 +217,8 @@ def test_the_verdict_rests_on_constants_of_both_models_and_on_limits_the_least_k
     assert {"ARBITRATION_HOLD_US", "BASE_RATE_MBIT_S", "PHY_DELAY_TICKS", "MAX_PAYLOAD_BYTES[S400]"} <= set(found)
     assert found["node.execution.time_us"].grade == "derived"
     for name, one in found.items():
-        if name in CONSTANTS:
-            known = CONSTANTS[name]
+        if name in c:
+            known = c[name]
             assert (one.value, one.grade, one.source) == (known, known.grade, known.source)
     grades = [grade for grade, _ in groupby(one.grade for one in found.values())]
     assert grades == sorted(grades, key=GRADES.index)

@@ -8,7 +8,7 @@ from itertools import chain
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, MOST_REPEATED, TERMS, bit_us, payload_us
+from busplan.buses.can.equations import BUS_LOAD, TERMS, bit_us, c, payload_us
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
@@ -456,7 +456,7 @@ class CanCycle(BusCycle):
         return {
             "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s,
             "bus_load": self.load,
-            "expected_load": least + EXPECTED_STUFFING * (most - least),
+            "expected_load": least + c.EXPECTED_STUFFING * (most - least),
         }
 
     @cached_property
@@ -507,10 +507,10 @@ class CanCycle(BusCycle):
         if possible_us:
             why = "its frames may hide this" if self.traffic.access == "burst" else "the test of queues is sufficient"
             lines.append(("upper bound", f"up to {_short(possible_us)} us less may do: {why}"))
-        most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
+        most = bisect_left(range(int(c.MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
         if most >= 0:
             kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"
-            broken = f" makes {self._late_with(most + 1)} late" if most < MOST_REPEATED else " was not tried"
+            broken = f" makes {self._late_with(most + 1)} late" if most < c.MOST_REPEATED else " was not tried"
             lines.append((REPEATED, kept + broken))
         return tuple(lines)
 

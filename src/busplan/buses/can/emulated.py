@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.buses.can.equations import BASE_BITS, ERROR_BITS, FD_LENGTHS, FRAME_BYTES, bit_us
+from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c
 from busplan.buses.can.frames import SYNC, Stream, place, streams, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Network
@@ -107,7 +107,7 @@ class _Machine:
             wires_us = [(stream.frame_us + unstuffed.frame_us) / 2] * len(data)
             if not is_fd:
                 flags = np.full(len(data), is_extended), np.zeros(len(data), dtype=np.bool_), np.full(len(data), size)
-                first = [int.from_bytes(part.ljust(int(FRAME_BYTES), b"\0"), "big") for part in data]
+                first = [int.from_bytes(part.ljust(int(c.FRAME_BYTES), b"\0"), "big") for part in data]
                 bits = written_bits(np.full(len(data), identifier), *flags, np.array(first, dtype=np.uint64))
                 wires_us = (bits * plain(bit_us(self.traffic.bit_rate_kbit_s))).tolist()
             name = f"{identifier:0{8 if is_extended else 3}X}{mark}"
@@ -180,7 +180,7 @@ class _Machine:
             is_destroyed = bool(errors) and errors[0] * self.period_us <= now_us
             if is_destroyed:
                 del errors[0]
-                frame, wire_us = _ERROR, wire_us / 2 + plain(ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
+                frame, wire_us = _ERROR, wire_us / 2 + plain(c.ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
                 heappush(waiting, (sender.order, running, sender, number))
             now_us += wire_us
             if now_us >= self.end_us:

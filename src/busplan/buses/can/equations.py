@@ -18,7 +18,7 @@ MOST_DATA_BIT_RATE: Final = DATA_BIT_RATES[-1]
 """Largest data bit rate of CAN FD [kbit/s]."""
 IdentifierBits = Literal[11, 29]
 
-CONSTANTS: Final = Constants("busplan.buses.can")
+c: Final = Constants("busplan.buses.can")
 """Every constant with a source, by its name here."""
 
 BASE_BITS: Final = 11
@@ -27,39 +27,9 @@ MAX_IDENTIFIER: Final[Mapping[int, int]] = MappingProxyType({11: (1 << 11) - 1, 
 FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """Lengths that the DLC of an FD frame can say; other data is padded to the next [bytes]."""
 
-STUFFED_BITS: Final = CONSTANTS["STUFFED_BITS"]
-STUFFED_BITS_EXTENDED: Final = CONSTANTS["STUFFED_BITS_EXTENDED"]
-FIXED_BITS: Final = CONSTANTS["FIXED_BITS"]
-STUFF_STEP_BITS: Final = CONSTANTS["STUFF_STEP_BITS"]
-BITS_PER_BYTE: Final = CONSTANTS["BITS_PER_BYTE"]
-FRAME_BYTES: Final = CONSTANTS["FRAME_BYTES"]
-FD_OPENING_BITS: Final = CONSTANTS["FD_OPENING_BITS"]
-FD_OPENING_BITS_EXTENDED: Final = CONSTANTS["FD_OPENING_BITS_EXTENDED"]
-FD_CLOSING_BITS: Final = CONSTANTS["FD_CLOSING_BITS"]
-FD_CONTROL_BITS: Final = CONSTANTS["FD_CONTROL_BITS"]
-FD_COUNT_BITS: Final = CONSTANTS["FD_COUNT_BITS"]
-FD_CRC_BITS: Final = CONSTANTS["FD_CRC_BITS"]
-FD_LONG_CRC_BITS: Final = CONSTANTS["FD_LONG_CRC_BITS"]
-FD_SHORT_BYTES: Final = CONSTANTS["FD_SHORT_BYTES"]
-FD_DELIMITER_BITS: Final = CONSTANTS["FD_DELIMITER_BITS"]
-FD_FRAME_BYTES: Final = CONSTANTS["FD_FRAME_BYTES"]
-FD_LATE_BITS: Final = CONSTANTS["FD_LATE_BITS"]
-SYNC_IDENTIFIER: Final = CONSTANTS["SYNC_IDENTIFIER"]
-FEEDBACK_IDENTIFIER: Final = CONSTANTS["FEEDBACK_IDENTIFIER"]
-COMMAND_IDENTIFIER: Final = CONSTANTS["COMMAND_IDENTIFIER"]
-PDO_STEP: Final = CONSTANTS["PDO_STEP"]
-MOST_PDOS: Final = CONSTANTS["MOST_PDOS"]
-MOST_NODES: Final = CONSTANTS["MOST_NODES"]
-MOST_EVERY: Final = CONSTANTS["MOST_EVERY"]
-PIPELINE_CYCLES: Final = CONSTANTS["PIPELINE_CYCLES"]
-UNMEASURED_SHARE: Final = CONSTANTS["UNMEASURED_SHARE"]
-MOST_BLOCKS: Final = CONSTANTS["MOST_BLOCKS"]
-MAX_LOAD: Final = CONSTANTS["MAX_LOAD"]
-SATURATED: Final = CONSTANTS["SATURATED"]
-MOST_STEPS: Final = CONSTANTS["MOST_STEPS"]
-ERROR_BITS: Final = CONSTANTS["ERROR_BITS"]
-MOST_REPEATED: Final = CONSTANTS["MOST_REPEATED"]
-EXPECTED_STUFFING: Final = CONSTANTS["EXPECTED_STUFFING"]
+
+SATURATED: Final = c.unchanged["SATURATED"]
+MOST_STEPS: Final = c.unchanged["MOST_STEPS"]
 
 KBIT_US = 1000
 """Microseconds of a bit at 1 kbit/s."""
@@ -93,9 +63,11 @@ def frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool)
     >>> frame_bits(8, identifier_bits=11, is_stuffed=False)
     111.0
     """
-    stuffable = choose(identifier_bits > BASE_BITS, STUFFED_BITS_EXTENDED, STUFFED_BITS) + BITS_PER_BYTE * data_bytes
-    bits: Number = stuffable + FIXED_BITS
-    return bits + rounded_down((stuffable - 1) / STUFF_STEP_BITS) if is_stuffed else bits
+    stuffable = (
+        choose(identifier_bits > BASE_BITS, c.STUFFED_BITS_EXTENDED, c.STUFFED_BITS) + c.BITS_PER_BYTE * data_bytes
+    )
+    bits: Number = stuffable + c.FIXED_BITS
+    return bits + rounded_down((stuffable - 1) / c.STUFF_STEP_BITS) if is_stuffed else bits
 
 
 def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool) -> tuple[Number, Number]:
@@ -125,18 +97,18 @@ def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bo
     >>> fd_frame_bits(64, identifier_bits=11, is_stuffed=True), fd_frame_bits(10, identifier_bits=29, is_stuffed=False)
     ((32.0, 680.0), (48.0, 129.0))
     """
-    opening = choose(identifier_bits > BASE_BITS, FD_OPENING_BITS_EXTENDED, FD_OPENING_BITS)
+    opening = choose(identifier_bits > BASE_BITS, c.FD_OPENING_BITS_EXTENDED, c.FD_OPENING_BITS)
     padded_bytes = next_entry(FD_LENGTHS, data_bytes, words="the next length of a DLC")
-    stuffable = FD_CONTROL_BITS + BITS_PER_BYTE * padded_bytes
-    tail = FD_COUNT_BITS + choose(padded_bytes > FD_SHORT_BYTES, FD_LONG_CRC_BITS, FD_CRC_BITS)
-    nominal_bits: Number = opening + FD_CLOSING_BITS
-    data_bits: Number = stuffable + tail + rounded_up(tail / STUFF_STEP_BITS) + FD_DELIMITER_BITS
+    stuffable = c.FD_CONTROL_BITS + c.BITS_PER_BYTE * padded_bytes
+    tail = c.FD_COUNT_BITS + choose(padded_bytes > c.FD_SHORT_BYTES, c.FD_LONG_CRC_BITS, c.FD_CRC_BITS)
+    nominal_bits: Number = opening + c.FD_CLOSING_BITS
+    data_bits: Number = stuffable + tail + rounded_up(tail / c.STUFF_STEP_BITS) + c.FD_DELIMITER_BITS
     if not is_stuffed:
         return nominal_bits, data_bits
     # A stuff bit behind the last bit of the opening has the data bit rate.
     return (
-        nominal_bits + rounded_down((opening - 2) / STUFF_STEP_BITS),
-        data_bits + rounded_up(stuffable / STUFF_STEP_BITS),
+        nominal_bits + rounded_down((opening - 2) / c.STUFF_STEP_BITS),
+        data_bits + rounded_up(stuffable / c.STUFF_STEP_BITS),
     )
 
 
@@ -196,7 +168,7 @@ def frame_us(
 def payload_us(
     payload_bytes: Number,
     *,
-    frame_bytes: tuple[float, ...] = (FRAME_BYTES,),
+    frame_bytes: tuple[float, ...] = (),
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
     data_bit_rate_kbit_s: Number = 0.0,
@@ -210,7 +182,7 @@ def payload_us(
     payload_bytes
         Payload, 1 or more [bytes]; float or array.
     frame_bytes
-        Most data of each frame in their order; further ones are as the last [bytes].
+        Most data of each frame in their order, without it of classical frames; further ones are as the last [bytes].
     identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, late_bits, is_stuffed
         As `frame_us` takes them.
 
@@ -234,7 +206,7 @@ def payload_us(
     def if_any(data_bytes: Number) -> Number:
         return choose(data_bytes > 0, of_frame(data_bytes), 0.0)
 
-    *first_bytes, most_bytes = frame_bytes
+    *first_bytes, most_bytes = frame_bytes or (c.FRAME_BYTES,)
     first_us: Number = 0.0
     rest_bytes = payload_bytes
     for size in first_bytes:

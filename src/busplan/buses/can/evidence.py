@@ -5,7 +5,7 @@ from math import inf
 from typing import Final, Literal
 
 from busplan.buses.can import equations
-from busplan.buses.can.equations import EXPECTED_STUFFING
+from busplan.buses.can.equations import c
 from busplan.buses.can.frames import Message, Traffic, streams
 from busplan.buses.can.waiting import message_responses
 from busplan.elementwise import plain
@@ -16,7 +16,7 @@ Stuffing = Literal["worst", "expected", "none"]
 
 def stuffed(_cycle: object, *, least: float, most: float, stuffing: Stuffing) -> float:
     """A figure between that without stuff bits and that with the most."""
-    shares: Mapping[Stuffing, float] = {"worst": 1, "expected": float(EXPECTED_STUFFING), "none": 0}
+    shares: Mapping[Stuffing, float] = {"worst": 1, "expected": float(c.EXPECTED_STUFFING), "none": 0}
     return most if stuffing == "worst" else least + shares[stuffing] * (most - least)
 
 

@@ -8,22 +8,16 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.buses.can.equations import (
     BASE_BITS,
-    COMMAND_IDENTIFIER,
-    ERROR_BITS,
-    FD_FRAME_BYTES,
-    FD_LATE_BITS,
-    FEEDBACK_IDENTIFIER,
-    FRAME_BYTES,
     MAX_IDENTIFIER,
-    MOST_PDOS,
-    PDO_STEP,
     bit_us,
+    c,
     frame_us,
     share_bytes,
 )
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, larger, plain, pointwise, smaller, total
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
+from busplan.sourced import cached
 
 FOLLOWS: Final = -1
 """Stands for the identifier after the last one of the group before."""
@@ -40,7 +34,7 @@ LOOP: Final = "loop"
 """Name of the way from SYNC to the executed commands."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
 """Names of a node's read payload and its write payload on CAN."""
-_FIRST: Final = {"read": FEEDBACK_IDENTIFIER, "write": COMMAND_IDENTIFIER}
+_FIRST: Final = {"read": "FEEDBACK_IDENTIFIER", "write": "COMMAND_IDENTIFIER"}
 
 
 class Pdos(NamedTuple):
@@ -54,9 +48,9 @@ class Pdos(NamedTuple):
     """PDOs of all its nodes [1]."""
     payload_bytes: Number
     """Data of each PDO [bytes]."""
-    frame_bytes: tuple[float, ...] = (FRAME_BYTES,)
+    frame_bytes: tuple[float, ...]
     """Most data of each of its frames in their order; further ones are as the last [bytes]."""
-    most_bytes: int = int(MOST_PDOS * FRAME_BYTES)
+    most_bytes: int
     """The most that its frames may carry [bytes]."""
     every: Number = 1
     """Cycles from one to the next; all count from the same SYNC [1]."""
@@ -152,7 +146,7 @@ class Traffic:
             bit_rate_kbit_s=self.bit_rate_kbit_s / slower,
             data_bit_rate_kbit_s=self.data_bit_rate_kbit_s / slower,
             messages=tuple(messages),
-            late_bits=float(FD_LATE_BITS),
+            late_bits=float(c.FD_LATE_BITS),
             clock_tolerance=0.0,
         )
 
@@ -347,16 +341,21 @@ def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> P
     payload = group.payload
     identifier = getattr(payload, f"{NAMES[kind]}_identifier")
     if identifier is None:
-        identifier = int(_FIRST[kind]) if is_first else FOLLOWS
+        identifier = int(c[_FIRST[kind]]) if is_first else FOLLOWS
     number = of_node(group)
     payload_bytes = share_bytes(group.read_bytes if kind == "read" else group.write_bytes, pdos=number)
-    pdos = Pdos(kind, group.name, identifier, group.nodes * number, payload_bytes, every=payload.every)
+    frame_bytes = (c.FRAME_BYTES if bus.data_bit_rate_kbit_s is None else c.FD_FRAME_BYTES,)
     lengths = getattr(payload, f"{NAMES[kind]}_pdos")
-    if lengths is not None:
-        return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))
-    if bus.data_bit_rate_kbit_s is None:
-        return pdos
-    return pdos._replace(frame_bytes=(FD_FRAME_BYTES,), most_bytes=int(MOST_PDOS * FD_FRAME_BYTES))
+    return Pdos(
+        kind,
+        group.name,
+        identifier,
+        group.nodes * number,
+        payload_bytes,
+        frame_bytes=frame_bytes if lengths is None else lengths,
+        most_bytes=int(c.MOST_PDOS * frame_bytes[0]) if lengths is None else sum(lengths),
+        every=payload.every,
+    )
 
 
 def _message(message: Any, bus: Any, nodes: Number) -> Message:
@@ -459,7 +458,7 @@ class Stream(NamedTuple):
         return (self.burst - 1) * self.frames_us
 
 
-@lru_cache(maxsize=4)
+@cached(maxsize=4)
 def streams(traffic: Traffic) -> tuple[Stream, ...]:
     """Every stream of a network: SYNC, feedback, command, and other messages.
 
@@ -517,7 +516,7 @@ def repeated(sent: Sequence[Stream], traffic: Traffic) -> Stream:
     frame's own C; the caller adds the longest C.
     """
     longest_us = reduce(larger, (stream.frame_us for stream in sent))
-    us = ERROR_BITS * bit_us(traffic.bit_rate_kbit_s) + longest_us
+    us = c.ERROR_BITS * bit_us(traffic.bit_rate_kbit_s) + longest_us
     times_us = {"frame_us": us, "period_us": traffic.error_period_us, "jitter_us": 0.0}
     errors = sent[0]._replace(name=REPEATED, group="", block=-1, first=-1, identifiers=1, is_message=True)
     return errors._replace(**times_us, burst=traffic.error_burst)
@@ -559,16 +558,18 @@ def _cyclic(traffic: Traffic) -> Iterator[Stream]:
         yield sync
     blocks: dict[str, int] = {}
     free: dict[str, Points] = {}
+    # One more than a bus allows breaks its limit already.
+    most_frames = int(c.MOST_PDOS) + 1
     for pdos in traffic.pdos:
         if (identifier := int(pdos.identifier)) != FOLLOWS:
             blocks[pdos.kind] = free[pdos.kind] = identifier
         first, count, left_bytes = free[pdos.kind], _whole(pdos.pdos), _whole(pdos.payload_bytes)
         free[pdos.kind] = first + count
-        for number, most_bytes in enumerate(islice(_most_bytes(pdos), _MOST_FRAMES)):
+        for number, most_bytes in enumerate(islice(_most_bytes(pdos), most_frames)):
             is_there, size = left_bytes > 0, larger(smaller(left_bytes, most_bytes), 0)
             if is_everywhere(left_bytes <= 0):
                 break
-            step = number * int(PDO_STEP)
+            step = number * int(c.PDO_STEP)
             yield sync._replace(
                 name=pdos.name,
                 group=pdos.group,
@@ -580,10 +581,6 @@ def _cyclic(traffic: Traffic) -> Iterator[Stream]:
                 period_us=traffic.period_us * pdos.every,
             )
             left_bytes = left_bytes - most_bytes
-
-
-_MOST_FRAMES: Final = int(MOST_PDOS) + 1
-"""Frames of a PDO that have streams: one more than a bus allows breaks its limit already."""
 
 
 def _most_bytes(pdos: Pdos) -> Iterator[int]:

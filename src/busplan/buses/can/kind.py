@@ -8,13 +8,10 @@ from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
 from busplan.buses.can.equations import (
     BASE_BITS,
     BIT_RATES,
-    CONSTANTS,
     DATA_BIT_RATES,
     FIGURES,
     MAX_IDENTIFIER,
-    MAX_LOAD,
-    PIPELINE_CYCLES,
-    SYNC_IDENTIFIER,
+    c,
 )
 from busplan.buses.can.frames import streams, traffic_of
 from busplan.buses.can.rules import LIMITS, RULES
@@ -122,7 +119,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
     rate_keys = ("bus.bit_rate_kbit_s", "bus.data_bit_rate_kbit_s")
-    constants = CONSTANTS
+    constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
         "bus.access": Key(chooses=True, meaning="if the host's software can"),
@@ -130,12 +127,12 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.data_bit_rate_kbit_s": Key("f_data", meaning="if transceivers and cable carry it"),
         "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit"),
         "bus.host_us": Key("host"),
-        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
+        "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
         "bus.clock_tolerance": Key("df"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
-        "bus.sync_identifier": Key(default=SYNC_IDENTIFIER),
-        "limits.max_load": Key(default=MAX_LOAD),
+        "bus.sync_identifier": Key(default="SYNC_IDENTIFIER"),
+        "limits.max_load": Key(default="MAX_LOAD"),
         "payload.every": Key("every"),
         "node.execution.worst_extra_us": Key("T_extra"),
         "message.payload_bytes": Key("s"),

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.equations import BASE_BITS, FD_FRAME_BYTES, FD_LENGTHS, FRAME_BYTES, bit_us, frame_us
+from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
 from busplan.buses.can.frames import SYNC, Stream, streams
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
@@ -246,7 +246,7 @@ class _Log:
         # Without a data bit rate the frames that switch take no time.
         for places, data_rate in ((~is_fd, 0.0), (is_fd & ~switched, nominal), (is_fd & switched & bool(data), data)):
             us[places] = frame_us(
-                np.minimum(self.frames.sizes[taken[places]], FD_FRAME_BYTES if data_rate else FRAME_BYTES),
+                np.minimum(self.frames.sizes[taken[places]], c.FD_FRAME_BYTES if data_rate else c.FRAME_BYTES),
                 identifier_bits=np.where(self.frames.extended[taken[places]], 29, BASE_BITS),
                 bit_rate_kbit_s=nominal,
                 data_bit_rate_kbit_s=data_rate,

@@ -8,7 +8,7 @@ from math import inf
 from typing import Final
 
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
+from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
 from busplan.buses.can.frames import (
     NOT_BY_PRIORITY,
     Points,
@@ -250,8 +250,8 @@ LIMITS: Final = (
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
         _pdos,
-        lambda _network: MOST_NODES,
-        way_out=f"a second bus has {MOST_NODES:g} more",
+        lambda _network: c.MOST_NODES,
+        way_out="a second bus has {most:g} more",
     ),
     Limit(
         "payload",

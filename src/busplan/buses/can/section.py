@@ -7,20 +7,12 @@ from pydantic import Field
 
 from busplan.buses.can.cycle import WORST, TimingModelName
 from busplan.buses.can.equations import (
-    FD_FRAME_BYTES,
-    FRAME_BYTES,
     LEAST_BIT_RATE,
     MAX_IDENTIFIER,
-    MAX_LOAD,
     MOST_BIT_RATE,
     MOST_DATA_BIT_RATE,
-    MOST_EVERY,
-    MOST_NODES,
-    MOST_PDOS,
-    PIPELINE_CYCLES,
-    SYNC_IDENTIFIER,
-    UNMEASURED_SHARE,
     IdentifierBits,
+    c,
 )
 from busplan.buses.can.frames import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
@@ -52,8 +44,8 @@ Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
 BitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_BIT_RATE, allow_inf_nan=False)]
 DataBitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_DATA_BIT_RATE, allow_inf_nan=False)]
 PdoBytes = Annotated[
-    tuple[Annotated[int, Field(ge=1, le=int(FD_FRAME_BYTES))], ...],
-    Field(strict=False, min_length=1, max_length=int(MOST_PDOS)),
+    tuple[Annotated[int, Field(ge=1, le=int(c.unchanged["FD_FRAME_BYTES"]))], ...],
+    Field(strict=False, min_length=1, max_length=int(c.unchanged["MOST_PDOS"])),
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 Queue = Literal["priority", "fifo", "single-buffer"]
@@ -84,13 +76,15 @@ class CanBus(BusSection):
         examples=["polled"],
     )
     sync_identifier: Identifier = Field(
-        default=int(SYNC_IDENTIFIER), description="Identifier of SYNC", examples=[int(SYNC_IDENTIFIER)]
+        default_factory=lambda: int(c.SYNC_IDENTIFIER),
+        description="Identifier of SYNC",
+        examples=[int(c.unchanged["SYNC_IDENTIFIER"])],
     )
     sync_counter: bool = Field(
         default=False, description="Whether SYNC carries its counter, one byte (CiA 301)", examples=[True]
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
-        default=int(PIPELINE_CYCLES),
+        default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle; "
         "without SYNC at least 1. For latency, and a loop on the host",
         examples=[1],
@@ -152,7 +146,7 @@ class CanBus(BusSection):
         """Standard uncertainty of the host's own time [us]."""
         if self.host_uncertainty_us is not None:
             return self.host_uncertainty_us
-        share = UNKNOWN_SHARE if self.host_grade in ("measured", "derived") else UNMEASURED_SHARE
+        share = UNKNOWN_SHARE if self.host_grade in ("measured", "derived") else c.UNMEASURED_SHARE
         return share * self.host_us
 
 
@@ -164,7 +158,7 @@ class CanPayload(PayloadSection):
         description="Whether each node or each axis has a PDO in each direction; axes share the payload",
         examples=["axis"],
     )
-    every: Annotated[int, Field(ge=1, le=int(MOST_EVERY))] = Field(
+    every: Annotated[int, Field(ge=1, le=int(c.unchanged["MOST_EVERY"]))] = Field(
         default=1,
         description="PDOs go with every n-th SYNC (CANopen's transmission type n); all count from the same SYNC",
         examples=[4],
@@ -240,7 +234,7 @@ class CanMessage(Section):
         description="Whether an FD frame switches to bus.data_bit_rate_kbit_s",
         examples=[False],
     )
-    payload_bytes: Annotated[int, Field(ge=0, le=int(FD_FRAME_BYTES))] = Field(
+    payload_bytes: Annotated[int, Field(ge=0, le=int(c.unchanged["FD_FRAME_BYTES"]))] = Field(
         description="Data, up to 8, of an FD frame up to 64 [bytes]", examples=[8]
     )
     period_us: PeriodUs = Field(
@@ -266,8 +260,8 @@ class CanMessage(Section):
     def _problems(self) -> Iterator[Problem]:
         if self.per_node and self.sender is not None:
             yield Problem("has each node for its sender", key="sender", kind="inconsistent")
-        if self.payload_bytes > FRAME_BYTES and not self.fd:
-            why = f"is over the {FRAME_BYTES:g} bytes of a classical frame; fd = true allows {FD_FRAME_BYTES:g}"
+        if self.payload_bytes > c.FRAME_BYTES and not self.fd:
+            why = f"is over the {c.FRAME_BYTES:g} bytes of a classical frame; fd = true allows {c.FD_FRAME_BYTES:g}"
             yield Problem(why, key="payload_bytes")
         if not (self.brs or self.fd):
             why = "is of an FD frame that keeps the bit rate, and a classical frame has one alone; write fd = true"
@@ -278,7 +272,7 @@ class CanLimits(Limits):
     """Section [limits]: what a plan must keep free, and the load of the bus."""
 
     max_load: Annotated[float, Field(gt=0, le=0.999, allow_inf_nan=False)] = Field(
-        default=float(MAX_LOAD),
+        default_factory=lambda: float(c.MAX_LOAD),
         description="Largest worst-case load of the bus, 0..0.999 (Lenze: 0.8); without SYNC none, unless it is given",
         examples=[0.6],
     )
@@ -408,8 +402,8 @@ class CanProfile(Profile):
                 yield Problem(f"is over {MAX_IDENTIFIER[bits]}, the largest of {bits} bits", key, "inconsistent")
         for place, message in enumerate(self.message):
             most = MAX_IDENTIFIER[message.identifier_bits or self.bus.identifier_bits]
-            if message.per_node and most - MOST_NODES < message.identifier <= most:
-                yield Problem(f"leaves no room for {MOST_NODES:g} nodes below {most}", f"message.{place}.identifier")
+            if message.per_node and most - c.MOST_NODES < message.identifier <= most:
+                yield Problem(f"leaves no room for {c.MOST_NODES:g} nodes below {most}", f"message.{place}.identifier")
         for name in (f"{direction}_identifier" for direction in _PDO_NAMES):
             identifiers = [getattr(group, name) for group in self.group]
             for place, identifier in enumerate(identifiers):
@@ -435,8 +429,8 @@ class CanProfile(Profile):
                 yield Problem(why, f"message.{place}.fd")
         for section, payload in self._payloads():
             for name in (f"{direction}_pdos" for direction in _PDO_NAMES):
-                if max(getattr(payload, name) or (0,)) > FRAME_BYTES:
-                    why = f"has a PDO over the {FRAME_BYTES:g} bytes of a classical frame"
+                if max(getattr(payload, name) or (0,)) > c.FRAME_BYTES:
+                    why = f"has a PDO over the {c.FRAME_BYTES:g} bytes of a classical frame"
                     yield Problem(why, f"{section}.{name}")
 
     def _payloads(self) -> Iterator[tuple[str, CanPayload]]:

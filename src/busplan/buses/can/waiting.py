@@ -2,14 +2,14 @@
 
 from array import array
 from collections.abc import Container, Iterator, Sequence
-from functools import cache, lru_cache, reduce
+from functools import cache, reduce
 from importlib import import_module
 from math import ceil, inf, isclose
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.can import response
-from busplan.buses.can.equations import MOST_BLOCKS, bit_us
+from busplan.buses.can.equations import bit_us, c
 from busplan.buses.can.frames import (
     NAMES,
     SYNC,
@@ -23,6 +23,7 @@ from busplan.buses.can.frames import (
 )
 from busplan.elementwise import choose, is_everywhere, is_off, larger, plain, smaller, total
 from busplan.english import first_of
+from busplan.sourced import cached
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: fro
     cyclic = [stream for stream in sent if not stream.is_message]
     bit, fullest = bit_us(traffic.bit_rate_kbit_s), last_place(cyclic)
     messages = [stream for stream in arriving(sent, fullest) if stream.is_message]
-    last, most = fullest, int(MOST_BLOCKS)
+    last, most = fullest, int(c.MOST_BLOCKS)
     if due is not None:
         last = last_place(sent_in(cyclic, due))
         # Without PDOs a cycle ends with SYNC, which waits for a single frame.
@@ -160,7 +161,7 @@ def _of_requests_us(
             *([getattr(message, key) for message in sent] for key in _OF_MESSAGES),
         )
         shape, arrays = _arrays(*columns, [0.0], [0.0])
-        _computing().cycle_waits(int(MOST_BLOCKS), *arrays)
+        _computing().cycle_waits(int(c.MOST_BLOCKS), *arrays)
         bounds_us.append(_points(arrays[-2], 0, shape))
     return smaller(*bounds_us)
 
@@ -198,7 +199,7 @@ class Response(NamedTuple):
     """R; infinite without an end, and then the rest says nothing [us]."""
 
 
-@lru_cache(maxsize=4)
+@cached(maxsize=4)
 def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tuple[Stream, Response], ...]:
     """Every message in the order of the profile, with its worst-case response.
 
@@ -216,7 +217,7 @@ def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tu
     return tuple((sent[number], response) for number, response in worst.items())
 
 
-@lru_cache(maxsize=4)
+@cached(maxsize=4)
 def _offered(traffic: Traffic) -> tuple[Stream, ...]:
     """Every stream, with the instant from which on its queue offers it: R - C, the smallest that agrees with itself.
 
@@ -278,7 +279,7 @@ def sync_response(traffic: Traffic) -> Response:
     return _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
 
 
-@lru_cache(maxsize=4)
+@cached(maxsize=4)
 def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     """SYNC, the last stream of each PDO, and every message, with the worst-case response of its last frame.
 

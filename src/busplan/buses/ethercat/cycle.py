@@ -6,12 +6,11 @@ from typing import Final, Literal
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run
 from busplan.buses.ethercat.equations import (
-    BYTE_BIAS_UNCERTAINTY_US,
-    BYTE_BIAS_US,
     FRAME,
     LATENCY_TABLE,
     MEAN,
     TERMS,
+    c,
     cable_us,
     frame_bytes,
     overhead_bytes,
@@ -168,14 +167,14 @@ class EthercatCycle(BusCycle):
 
     def bias_us(self) -> Number:
         """Time of process data in addition to the wire: about a copy in the host [us]."""
-        return self.process_bytes * BYTE_BIAS_US
+        return self.process_bytes * c.BYTE_BIAS_US
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The delays of devices, the master's own time, and the time of bytes in addition to the wire."""
         return (
             *devices_doubts(self.network),
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
-            Doubt("bytes", "what a byte takes beyond the wire", self.process_bytes * BYTE_BIAS_UNCERTAINTY_US),
+            Doubt("bytes", "what a byte takes beyond the wire", self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US),
         )
 
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -327,7 +326,7 @@ class EthercatCycle(BusCycle):
         parts = (
             self.network.profile.bus.master_doubt_us,
             *(doubt.us / 2 for doubt in devices_doubts(self.network)),
-            self.process_bytes * BYTE_BIAS_UNCERTAINTY_US,
+            self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US,
             execution_us,
         )
         return square_root(total(part * part for part in parts))

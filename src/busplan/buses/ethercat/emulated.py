@@ -6,13 +6,10 @@ from typing import Final, NamedTuple
 
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.ethercat.equations import (
-    BYTE_BIAS_US,
-    CLOCK_BYTES,
-    DATAGRAM_BYTES,
     SHARED,
     SPLIT,
-    STATE_CHECK_BYTES,
     UNNAMED,
+    c,
     frame_bytes,
     room_bytes,
     sending_us,
@@ -100,7 +97,7 @@ def _packets(
 ) -> Iterator[tuple[int, bytes]]:
     """Stamps [ns] and packets, each sent one before its return; faults hit the last frame of a cycle that is due."""
     bus, random = network.profile.bus, emulation.random
-    jitter_us, bias_us = plain(bus.master_jitter_us), plain(BYTE_BIAS_US)
+    jitter_us, bias_us = plain(bus.master_jitter_us), plain(c.BYTE_BIAS_US)
     nodes, way_us = int(plain(network.nodes)), plain(devices_us(network)) + plain(cables_us(network))
     missing, lost, wrong, late = (emulation.drawn(fault, due) for fault in FAULTS)
     free_ns = 0.0
@@ -121,7 +118,7 @@ def _packets(
 
 
 def _bytes(part: _Datagram) -> int:
-    return part.size + int(DATAGRAM_BYTES)
+    return part.size + int(c.DATAGRAM_BYTES)
 
 
 def _packet(frame: _Frame, data: Sequence[bytes], cycle: int, *, passed: int = 0, is_taken: bool = True) -> bytes:
@@ -190,9 +187,9 @@ def _own(network: Network) -> Iterator[_Datagram]:
     yield from (_Datagram(*part, counters.get(part[0], nodes)) for part in _OF_MASTER.get(master, ()))
     if bus.distributed_clocks:
         command, station = ("FRMW", _STATION) if master in ("SOEM", "IgH", "ethercrab") else ("ARMW", 0)
-        yield _Datagram(command, _SYSTEM_TIME | station, int(CLOCK_BYTES[master] - DATAGRAM_BYTES), nodes)
-    if master in STATE_CHECK_BYTES:
-        size = int(STATE_CHECK_BYTES[master] - DATAGRAM_BYTES)
+        yield _Datagram(command, _SYSTEM_TIME | station, int(c.by_key("CLOCK_BYTES")[master] - c.DATAGRAM_BYTES), nodes)
+    if master in c.by_key("STATE_CHECK_BYTES"):
+        size = int(c.by_key("STATE_CHECK_BYTES")[master] - c.DATAGRAM_BYTES)
         yield from (_Datagram("FPRD", _STATE | _STATION + node, size, 1) for node in range(nodes))
 
 

@@ -24,41 +24,16 @@ LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
 )
 """Layout of the process data by master."""
 
-CONSTANTS: Final = Constants("busplan.buses.ethercat")
+c: Final = Constants("busplan.buses.ethercat")
 """Every constant with a source, by its name here."""
 
-BYTE_US: Final = CONSTANTS["BYTE_US"]
-PREAMBLE_BYTES: Final = CONSTANTS["PREAMBLE_BYTES"]
-ETHERNET_BYTES: Final = CONSTANTS["ETHERNET_BYTES"]
-CHECK_BYTES: Final = CONSTANTS["CHECK_BYTES"]
-GAP_BYTES: Final = CONSTANTS["GAP_BYTES"]
-HEADER_BYTES: Final = CONSTANTS["HEADER_BYTES"]
-DATAGRAM_BYTES: Final = CONSTANTS["DATAGRAM_BYTES"]
-LEAST_FRAME_BYTES: Final = CONSTANTS["LEAST_FRAME_BYTES"]
-MOST_FRAME_BYTES: Final = CONSTANTS["MOST_FRAME_BYTES"]
-MAILBOX_BYTES: Final = CONSTANTS["MAILBOX_BYTES"]
-MOST_DEVICES: Final = CONSTANTS["MOST_DEVICES"]
-MOST_CABLE_M: Final = CONSTANTS["MOST_CABLE_M"]
-CABLE_US_PER_M: Final = CONSTANTS["CABLE_US_PER_M"]
 _TX: Final = Spread.of(published("ethercat")["delays"]["tx_one_way_us"])
-CONSTANTS.computed("DELAY_US[100BASE-TX]", _TX.mean)
-CONSTANTS.computed("DELAY_UNCERTAINTY_US[100BASE-TX]", _TX.uncertainty)
-DELAY_US: Final = CONSTANTS.by_key("DELAY_US")
-"""One-way delay of a device by the ports that it has."""
-DELAY_UNCERTAINTY_US: Final = CONSTANTS.by_key("DELAY_UNCERTAINTY_US")
-MEASURED_DELAY_UNCERTAINTY_US: Final = CONSTANTS.computed("MEASURED_DELAY_UNCERTAINTY_US", 0.010 / 12**0.5)
+c.computed("DELAY_US[100BASE-TX]", lambda _: _TX.mean)
+c.computed("DELAY_UNCERTAINTY_US[100BASE-TX]", lambda _: _TX.uncertainty)
+c.computed("MEASURED_DELAY_UNCERTAINTY_US", lambda _: 0.010 / 12**0.5)
 _PER_BYTE: Final = Spread.of([row["published"] for row in rows_of("ethercat", "bytes")])
-BYTE_BIAS_US: Final = CONSTANTS.computed("BYTE_BIAS_US", _PER_BYTE.mean - BYTE_US)
-BYTE_BIAS_UNCERTAINTY_US: Final = CONSTANTS.computed("BYTE_BIAS_UNCERTAINTY_US", _PER_BYTE.uncertainty)
-UNMEASURED_MASTER_SHARE: Final = CONSTANTS["UNMEASURED_MASTER_SHARE"]
-HOUSEKEEPING_BYTES: Final = CONSTANTS.by_key("HOUSEKEEPING_BYTES")
-"""Datagrams that each master adds to the first frame of every cycle, without that of distributed clocks."""
-CLOCK_BYTES: Final = CONSTANTS.by_key("CLOCK_BYTES")
-"""Datagram of distributed clocks, which each master adds to them."""
-STATE_CHECK_BYTES: Final = CONSTANTS.by_key("STATE_CHECK_BYTES")
-"""Datagram for each device, by master: it reads the state of all devices in every cycle."""
-PIPELINE_CYCLES: Final = CONSTANTS["PIPELINE_CYCLES"]
-SYNC_SHIFT: Final = CONSTANTS["SYNC_SHIFT"]
+c.computed("BYTE_BIAS_US", lambda c: _PER_BYTE.mean - c.BYTE_US)
+c.computed("BYTE_BIAS_UNCERTAINTY_US", lambda _: _PER_BYTE.uncertainty)
 
 _BOTH_WAYS: Final = 2
 
@@ -76,7 +51,7 @@ def datagram_bytes(data_bytes: Number) -> Number:
     >>> datagram_bytes(8)
     20.0
     """
-    return data_bytes + DATAGRAM_BYTES
+    return data_bytes + c.DATAGRAM_BYTES
 
 
 def overhead_bytes(like: Number) -> Number:
@@ -92,7 +67,7 @@ def overhead_bytes(like: Number) -> Number:
     >>> overhead_bytes(1)
     40.0
     """
-    return traced_with(PREAMBLE_BYTES, like) + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES
+    return traced_with(c.PREAMBLE_BYTES, like) + c.ETHERNET_BYTES + c.HEADER_BYTES + c.CHECK_BYTES + c.GAP_BYTES
 
 
 def padding_bytes(datagrams_bytes: Number) -> Number:
@@ -108,7 +83,7 @@ def padding_bytes(datagrams_bytes: Number) -> Number:
     >>> padding_bytes(20), padding_bytes(100), padding_bytes(0)
     (24.0, 0.0, 0.0)
     """
-    short: Number = larger(LEAST_FRAME_BYTES - (datagrams_bytes + overhead_bytes(datagrams_bytes)), 0.0)
+    short: Number = larger(c.LEAST_FRAME_BYTES - (datagrams_bytes + overhead_bytes(datagrams_bytes)), 0.0)
     return choose(datagrams_bytes > 0, short, 0.0)
 
 
@@ -141,7 +116,7 @@ def room_bytes(datagrams: int) -> float:
     >>> room_bytes(1), room_bytes(2)
     (1486.0, 1474.0)
     """
-    return plain(MOST_FRAME_BYTES - plain(overhead_bytes(1)) - datagrams * DATAGRAM_BYTES)
+    return plain(c.MOST_FRAME_BYTES - plain(overhead_bytes(1)) - datagrams * c.DATAGRAM_BYTES)
 
 
 def sending_us(wire_bytes: Number) -> Number:
@@ -157,7 +132,7 @@ def sending_us(wire_bytes: Number) -> Number:
     >>> sending_us(100)
     8.0
     """
-    return wire_bytes * BYTE_US
+    return wire_bytes * c.BYTE_US
 
 
 def cable_us(cable_length_m: Number) -> Number:
@@ -173,7 +148,7 @@ def cable_us(cable_length_m: Number) -> Number:
     >>> cable_us(100)
     1.0
     """
-    return _BOTH_WAYS * cable_length_m * CABLE_US_PER_M
+    return _BOTH_WAYS * cable_length_m * c.CABLE_US_PER_M
 
 
 def device_us(delay_us: Number) -> Number:

@@ -2,26 +2,19 @@
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from functools import lru_cache
 from itertools import chain
 from math import lcm
 from typing import Final, NamedTuple
 
 from busplan.buses.cycle import Doubt
 from busplan.buses.ethercat.equations import (
-    CLOCK_BYTES,
-    DATAGRAM_BYTES,
-    DELAY_UNCERTAINTY_US,
-    DELAY_US,
-    HOUSEKEEPING_BYTES,
     LAYOUTS,
-    MEASURED_DELAY_UNCERTAINTY_US,
     SHARED,
     SPLIT,
-    STATE_CHECK_BYTES,
     UNNAMED,
     ProcessData,
     Starts,
+    c,
     cable_us,
     datagram_bytes,
     device_us,
@@ -49,6 +42,7 @@ from busplan.elementwise import (
     traced_with,
 )
 from busplan.errors import BusplanError
+from busplan.sourced import cached
 
 
 class Devices(NamedTuple):
@@ -106,7 +100,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     """
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
-    headers = total([traced_with(DATAGRAM_BYTES, devices[0].number)] * datagrams)
+    headers = total([traced_with(c.DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0  # bytes for data in the open frame, which is the last so far
     frames: Number = 0
     last: Number = 0.0
@@ -187,7 +181,7 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     devices, datagrams, first_bytes
         As `pack` takes them.
     """
-    room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
+    room, headers = room_bytes(datagrams), datagrams * float(c.DATAGRAM_BYTES)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
         size, left = plain(group.data_bytes), int(plain(group.number))
@@ -286,7 +280,7 @@ def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
     return tuple(Rate(unit.every, start + 1) for unit, start in zip(units, starts, strict=True))
 
 
-@lru_cache(maxsize=1 << 12)
+@cached(maxsize=1 << 12)
 def unit_cycles(
     units: tuple[Unit, ...], *, is_spread: bool, datagrams: int, first_bytes: float
 ) -> tuple[UnitCycle, ...]:
@@ -476,12 +470,16 @@ def housekeeping_bytes(network: Network) -> Number:
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
         return total(datagram_bytes(traced_with(size, network.nodes)) for size in bus.housekeeping_bytes)
-    tables = (HOUSEKEEPING_BYTES, CLOCK_BYTES) if bus.distributed_clocks else (HOUSEKEEPING_BYTES,)
+    tables = (
+        (c.by_key("HOUSEKEEPING_BYTES"), c.by_key("CLOCK_BYTES"))
+        if bus.distributed_clocks
+        else (c.by_key("HOUSEKEEPING_BYTES"),)
+    )
     added = [
         traced_with(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]
     ]
-    if bus.master in STATE_CHECK_BYTES:
-        checks_bytes = network.nodes * STATE_CHECK_BYTES[bus.master]
+    if bus.master in c.by_key("STATE_CHECK_BYTES"):
+        checks_bytes = network.nodes * c.by_key("STATE_CHECK_BYTES")[bus.master]
         # State checks of many devices fill frames of their own: their overhead counts here.
         added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes(network.nodes)]
     return total(added)
@@ -516,7 +514,9 @@ def mailbox_frame_us(network: Network) -> Number:
 def hop_us(group: Group) -> Number:
     """Delay of a device of a group, there and back: twice its `delay_us` [us]."""
     node = group.node
-    return device_us(traced_with(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us)
+    return device_us(
+        traced_with(c.by_key("DELAY_US")[node.port], group.nodes) if node.delay_us is None else node.delay_us
+    )
 
 
 def devices_us(network: Network) -> Number:
@@ -531,12 +531,12 @@ def cables_us(network: Network) -> Number:
 
 def devices_doubts(network: Network) -> Iterator[Doubt]:
     """Uncertainties of the delays there and back: fully correlated for a port type, independent for measured delays."""
-    for port, uncertainty_us in DELAY_UNCERTAINTY_US.items():
+    for port, uncertainty_us in c.by_key("DELAY_UNCERTAINTY_US").items():
         of_port = [group for group in network.groups if group.node.delay_us is None and group.node.port == port]
         if of_port:
             us = total(group.nodes for group in of_port) * uncertainty_us
             yield Doubt(of_port[0].key("delay_us"), f"delay of {port} devices", device_us(us))
     measured = [group for group in network.groups if group.node.delay_us is not None]
     if measured:
-        us = square_root(total(group.nodes for group in measured)) * MEASURED_DELAY_UNCERTAINTY_US
+        us = square_root(total(group.nodes for group in measured)) * c.MEASURED_DELAY_UNCERTAINTY_US
         yield Doubt(measured[0].key("delay_us"), "step of the clocks that measured delays", device_us(us))

@@ -15,15 +15,10 @@ from busplan.buses.ethercat.cycle import (
     sync0_share,
 )
 from busplan.buses.ethercat.equations import (
-    CONSTANTS,
     FIGURES,
-    MAILBOX_BYTES,
-    MOST_CABLE_M,
-    MOST_DEVICES,
-    PIPELINE_CYCLES,
     SEPARATE,
     SHARED,
-    SYNC_SHIFT,
+    c,
     room_bytes,
 )
 from busplan.buses.ethercat.frames import data_bytes, datagrams, layout, moves_us
@@ -132,7 +127,7 @@ SYNC_WINDOW: Final = Limit(
 """A frame must not move farther against SYNC0 than each drive allows."""
 LIMITS: Final = (
     NODE_LIMIT,
-    nodes_limit("devices", MOST_DEVICES, "segment", of="addresses of a"),
+    nodes_limit("devices", lambda: c.MOST_DEVICES, "segment", of="addresses of a"),
     Limit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
@@ -144,7 +139,7 @@ LIMITS: Final = (
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
         lambda network: reduce(larger, (group.node.cable_length_m for group in network.groups)),
-        lambda _network: MOST_CABLE_M,
+        lambda _network: c.MOST_CABLE_M,
         way_out="a device in between would do",
         place="node.cable_length_m",
     ),
@@ -232,15 +227,15 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
-    constants = CONSTANTS
+    constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second segment"),
         "bus.master_us": Key("T_master", role="host"),
         "bus.master_jitter_us": Key("J"),
         "bus.mailbox_polls": Key("polls"),
-        "bus.mailbox_bytes": Key("B", MAILBOX_BYTES),
-        "bus.sync_shift": Key("shift", SYNC_SHIFT, meaning="drives act, and sample, later"),
-        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
+        "bus.mailbox_bytes": Key("B", "MAILBOX_BYTES"),
+        "bus.sync_shift": Key("shift", "SYNC_SHIFT", meaning="drives act, and sample, later"),
+        "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
         "bus.distributed_clocks": Key(role="clock"),
         "node.cable_length_m": Key("L", role="cable"),
         "node.delay_us": Key("t_d"),

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from itertools import accumulate, pairwise
 from typing import Final, NamedTuple
 
-from busplan.buses.ethercat.equations import DELAY_UNCERTAINTY_US, DELAY_US, MEASURED_DELAY_UNCERTAINTY_US, cable_us
+from busplan.buses.ethercat.equations import c, cable_us
 from busplan.buses.network import Network
 from busplan.buses.rule import RecordedFigure
 from busplan.elementwise import plain
@@ -97,8 +97,10 @@ class LineDelays(NamedTuple):
         )
         if nodes is None:
             return figure
-        step_us = MEASURED_DELAY_UNCERTAINTY_US / len(numbers) ** 0.5
-        planned_doubt_us = float(DELAY_UNCERTAINTY_US[nodes.node.port]) if nodes.node.delay_us is None else step_us
+        step_us = c.MEASURED_DELAY_UNCERTAINTY_US / len(numbers) ** 0.5
+        planned_doubt_us = (
+            float(c.by_key("DELAY_UNCERTAINTY_US")[nodes.node.port]) if nodes.node.delay_us is None else step_us
+        )
         return figure._replace(
             planned=_planned_us(nodes) + _cable_us(nodes),
             uncertainty=expanded(planned_doubt_us, step_us),
@@ -184,7 +186,7 @@ def _span_ns(times_ns: Mapping[int, int]) -> int:
 def _planned_us(nodes: ProfileGroup) -> float:
     """Delay of a device one way as planned [us]."""
     delay_us = nodes.node.delay_us
-    return float(DELAY_US[nodes.node.port]) if delay_us is None else plain(delay_us)
+    return float(c.by_key("DELAY_US")[nodes.node.port]) if delay_us is None else plain(delay_us)
 
 
 def _cable_us(nodes: ProfileGroup) -> float:

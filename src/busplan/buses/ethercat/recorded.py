@@ -10,11 +10,7 @@ import numpy.typing as npt
 
 from busplan.buses.ethercat.cycle import LAST_BYTE, EthercatCycle
 from busplan.buses.ethercat.equations import (
-    BYTE_BIAS_UNCERTAINTY_US,
-    BYTE_BIAS_US,
-    BYTE_US,
-    DATAGRAM_BYTES,
-    GAP_BYTES,
+    c,
     frame_bytes,
     sending_us,
 )
@@ -43,7 +39,6 @@ _JITTER: Final = "bus.master_jitter_us"
 _MISSED: Final = "limits.missed_cycles"
 _STEP_BACK_NS: Final = 50_000
 """A stamp further before its predecessor means that the clock was set back; less may be two capture queues [ns]."""
-_GAP_US: Final = plain(sending_us(GAP_BYTES))
 _TWO_STAMPS: Final = 0.5
 """Standard uncertainty of the longest of many differences of two stamps, in steps: their error is a step at most."""
 _LEAST_SPAN_BYTES: Final = 200
@@ -168,7 +163,7 @@ class _Seen:
     @property
     def early(self) -> int:
         """Number of frames that returned sooner than it takes to send them."""
-        least_us = self.wire_us[self.trips.sent] - _GAP_US - 2 * self.stamp_us
+        least_us = self.wire_us[self.trips.sent] - plain(sending_us(c.GAP_BYTES)) - 2 * self.stamp_us
         return int(np.count_nonzero(self.trips_us < least_us))
 
     @property
@@ -260,7 +255,7 @@ class _Seen:
             for values in (self.wire_us, self.data_bytes, self.datagrams_bytes)
         )
         way_us = plain(devices_us(self.network)) + plain(cables_us(self.network)) + self.delays.more_us(self.network)
-        host_us = trips_us - wire_us - data_bytes * BYTE_BIAS_US - way_us
+        host_us = trips_us - wire_us - data_bytes * c.BYTE_BIAS_US - way_us
         return _CycleValues(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
 
     def _without_frame(self, cycles: SeenCycles, with_less: int) -> RecordedFigure:
@@ -302,7 +297,7 @@ class _Seen:
             return
         doubts = [
             *(plain(doubt.us) for doubt in devices_doubts(self.network)),
-            plain(planned.process_bytes) * BYTE_BIAS_UNCERTAINTY_US,
+            plain(planned.process_bytes) * c.BYTE_BIAS_UNCERTAINTY_US,
             plain(bus.master_doubt_us),
             self.stamp_us * _TWO_STAMPS,
         ]
@@ -374,19 +369,19 @@ class _Seen:
         order = np.argsort(sent_ns, kind="stable")
         last_ns = np.maximum.accumulate(back_ns[order])
         alone = order[np.concatenate(([True], sent_ns[order][1:] >= last_ns[:-1]))]
-        sizes = self.wire_us[self.trips.sent[alone]] / BYTE_US
+        sizes = self.wire_us[self.trips.sent[alone]] / c.BYTE_US
         if sizes.max() - sizes.min() < _LEAST_SPAN_BYTES:
             return
         fitted = line(sizes, self.trips_us[alone], self.stamp_us * _TWO_STAMPS)
         if fitted is None:
             return
         slope, error = fitted
-        doubt = expanded(error, BYTE_BIAS_UNCERTAINTY_US) or 0.0
-        is_hidden = slope + doubt < BYTE_US
+        doubt = expanded(error, c.BYTE_BIAS_UNCERTAINTY_US) or 0.0
+        is_hidden = slope + doubt < c.BYTE_US
         yield RecordedFigure(
             "time of a byte",
             "us",
-            BYTE_US + BYTE_BIAS_US,
+            c.BYTE_US + c.BYTE_BIAS_US,
             slope,
             doubt,
             "at most",
@@ -459,7 +454,7 @@ def _up(us: float) -> float:
 
 
 def _datagrams_bytes(parts: Sequence[Datagram]) -> float:
-    return sum(part.data_bytes + plain(DATAGRAM_BYTES) for part in parts)
+    return sum(part.data_bytes + plain(c.DATAGRAM_BYTES) for part in parts)
 
 
 def _trips(frames: EthercatFrames) -> _Trips:

@@ -7,15 +7,12 @@ from pydantic import Field, field_validator
 
 from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
 from busplan.buses.ethercat.equations import (
-    MAILBOX_BYTES,
-    PIPELINE_CYCLES,
     SEPARATE,
-    SYNC_SHIFT,
-    UNMEASURED_MASTER_SHARE,
     Master,
     Port,
     ProcessData,
     Starts,
+    c,
     room_bytes,
 )
 from busplan.buses.ethercat.frames import MOST_CYCLES, checked_hyperperiod
@@ -67,7 +64,7 @@ class EthercatBus(BusSection):
         examples=[True],
     )
     sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
-        default=float(SYNC_SHIFT),
+        default_factory=lambda: float(c.SYNC_SHIFT),
         description="SYNC0 after the master's task, a share of the period, 0..0.999; 0 is the next task; with "
         "distributed clocks only",
         examples=[0.5],
@@ -76,7 +73,9 @@ class EthercatBus(BusSection):
         default=0, description="Mailbox polls in each cycle, each in its own frame", examples=[1]
     )
     mailbox_bytes: Annotated[int, Field(ge=1, le=int(room_bytes(1)))] = Field(
-        default=int(MAILBOX_BYTES), description="Data of each mailbox poll [bytes]", examples=[int(MAILBOX_BYTES)]
+        default_factory=lambda: int(c.MAILBOX_BYTES),
+        description="Data of each mailbox poll [bytes]",
+        examples=[int(c.unchanged["MAILBOX_BYTES"])],
     )
     master_us: TimeUs = Field(
         default=0.0,
@@ -95,7 +94,7 @@ class EthercatBus(BusSection):
     )
     master_jitter_us: TimeUs = Field(default=0.0, description="How late the frames may start [us]", examples=[20])
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(
-        default=int(PIPELINE_CYCLES),
+        default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; for latency, and a loop on the host",
         examples=[1],
     )
@@ -116,7 +115,7 @@ class EthercatBus(BusSection):
         if self.master_uncertainty_us is not None:
             return self.master_uncertainty_us
         is_known = self.master_grade in ("measured", "derived", "calibrated")
-        return (UNKNOWN_SHARE if is_known else UNMEASURED_MASTER_SHARE) * self.master_us
+        return (UNKNOWN_SHARE if is_known else c.UNMEASURED_MASTER_SHARE) * self.master_us
 
 
 class EthercatNode(NodeSection):

@@ -17,16 +17,7 @@ from functools import cached_property, partial
 from busplan.buses.cycle import BUT_FIRST, FIRST, BusEvent, BusLatency, Doubt, Run
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
-    BASE_RATE_MBIT_S,
-    BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
-    BROADCAST_CLOCK_MHZ,
-    BROADCAST_NODE_BYTES,
-    BROADCAST_SLOT_CLOCKS,
-    FIRST_BROADCAST_CLOCKS,
-    HUB_TIMING_BYTES,
-    HUB_WAIT_PER_NODE_US,
-    HUB_WAIT_US,
-    QUADLET_WRITE_REQUEST_BYTES,
+    c,
     padded_bytes,
 )
 from busplan.buses.ieee1394.cycle import CycleWithStarts
@@ -44,7 +35,7 @@ def hub_block_bytes(network: Network) -> Number:
     network
         The network; of any sort.
     """
-    return total(group.nodes * _with_quadlet(group.read_bytes) for group in network.groups) + HUB_TIMING_BYTES
+    return total(group.nodes * _with_quadlet(group.read_bytes) for group in network.groups) + c.HUB_TIMING_BYTES
 
 
 def write_block_bytes(network: Network) -> Number:
@@ -59,7 +50,7 @@ def write_block_bytes(network: Network) -> Number:
 
 
 def _with_quadlet(payload_bytes: Number) -> Number:
-    return padded_bytes(payload_bytes) + BROADCAST_NODE_BYTES
+    return padded_bytes(payload_bytes) + c.BROADCAST_NODE_BYTES
 
 
 class BroadcastCycle(CycleWithStarts):
@@ -73,7 +64,7 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def query_us(self) -> Number:
         """The query with its acknowledge [us]."""
-        data_us = self.delays.data_us(QUADLET_WRITE_REQUEST_BYTES)
+        data_us = self.delays.data_us(c.QUADLET_WRITE_REQUEST_BYTES)
         query_us = self.delays.arbitration_us + data_us + self.delays.acknowledge_us
         return named(query_us, "query_us", "T_query")
 
@@ -93,10 +84,10 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def first_wait_us(self) -> Number:
         """Wait of the first node after the query, beyond its gap [us]."""
-        return larger(self._clocks_us(FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
+        return larger(self._clocks_us(c.FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
 
     def _clocks_us(self, clocks: Number) -> Number:
-        return traced_with(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
+        return traced_with(clocks, self.link.hops) / c.BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
         """Wait of the next node after the broadcast of a node, where each has its own time [us].
@@ -111,7 +102,7 @@ class BroadcastCycle(CycleWithStarts):
         if not self._is_timed:
             return 0.0
         sent_us = self.arbitration_us + self.broadcast_us(group)
-        return larger(self._clocks_us(BROADCAST_SLOT_CLOCKS) - sent_us, 0.0)
+        return larger(self._clocks_us(c.BROADCAST_SLOT_CLOCKS) - sent_us, 0.0)
 
     @cached_property
     def slot_waits_us(self) -> Number:
@@ -125,7 +116,7 @@ class BroadcastCycle(CycleWithStarts):
         if not self._is_isochronous or not self.link.has_gaps:
             return self.delays.arbitration_us
         return equations.arbitration_phase_us(
-            self.link.hops, hop_us=self.delays.hop_us, gap_count=0, gap_clock_mbit_s=BASE_RATE_MBIT_S
+            self.link.hops, hop_us=self.delays.hop_us, gap_count=0, gap_clock_mbit_s=c.BASE_RATE_MBIT_S
         )
 
     def broadcast_us(self, group: Group) -> Number:
@@ -136,7 +127,7 @@ class BroadcastCycle(CycleWithStarts):
         group
             The node's group.
         """
-        return self.delays.data_us(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
+        return self.delays.data_us(c.BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
 
     @property
     def node_waits_us(self) -> Number:
@@ -168,7 +159,7 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
-        wait_us = traced_with(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
+        wait_us = traced_with(c.HUB_WAIT_US, self.network.nodes) + c.HUB_WAIT_PER_NODE_US * self.network.nodes
         return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
 
     @cached_property

@@ -11,11 +11,7 @@ from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, 
 from busplan.buses.figure import AVAILABLE, NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
-    CYCLE_START_BYTES,
-    CYCLE_US,
-    DATA_RATE_MBIT_S,
-    LEAST_ASYNCHRONOUS_US,
-    SYNC_PACKET_BYTES,
+    c,
 )
 from busplan.buses.ieee1394.figures import LATENCY, SYNC, TERMS
 from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
@@ -107,8 +103,8 @@ class CycleWithStarts(BusCycle):
         data_us = equations.data_phase_us(
             delays.link.hops,
             hop_us=delays.hop_us,
-            packet_bytes=CYCLE_START_BYTES,
-            data_rate_mbit_s=DATA_RATE_MBIT_S["S100"] if self.link.has_gaps else self.link.data_rate_mbit_s,
+            packet_bytes=c.CYCLE_START_BYTES,
+            data_rate_mbit_s=c.by_key("DATA_RATE_MBIT_S")["S100"] if self.link.has_gaps else self.link.data_rate_mbit_s,
         )
         isochronous_us: Number = self.network.profile.bus.isochronous_us
         return delays.gaps.arbitration_reset_us + delays.arbitration_us + data_us + isochronous_us
@@ -124,8 +120,8 @@ class CycleWithStarts(BusCycle):
         terms_us
             All other terms [us]; of any sort.
         """
-        left_us = CYCLE_US - self.cycle_start_us
-        return rounded_down(terms_us / larger(left_us, LEAST_ASYNCHRONOUS_US)) + 1
+        left_us = c.CYCLE_US - self.cycle_start_us
+        return rounded_down(terms_us / larger(left_us, c.LEAST_ASYNCHRONOUS_US)) + 1
 
     @property
     def _has_starts(self) -> bool:
@@ -227,7 +223,7 @@ class CycleWithStarts(BusCycle):
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
         for round_ in map(tuple, super().each_round()):
-            while sent < starts and now_us >= sent * CYCLE_US:
+            while sent < starts and now_us >= sent * c.CYCLE_US:
                 yield start
                 sent, now_us = sent + 1, now_us + start_us
             yield round_
@@ -313,7 +309,7 @@ class Ieee1394Cycle(CycleWithStarts):
             ping_us: Number = sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
             return ping_us
         delays = self.delays
-        return delays.arbitration_us + delays.data_us(SYNC_PACKET_BYTES) + delays.gaps.arbitration_reset_us
+        return delays.arbitration_us + delays.data_us(c.SYNC_PACKET_BYTES) + delays.gaps.arbitration_reset_us
 
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The synchronous packet, and each transaction of every node."""

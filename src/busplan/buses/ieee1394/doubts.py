@@ -1,19 +1,13 @@
 """How well a cycle is known: the residual of Table I, the bias by it, and the doubt of each input."""
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from math import sqrt
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.cycle import Doubt
 from busplan.buses.ieee1394.constants import (
-    ARBITRATION_GAP_TICKS,
-    BASE_RATE_MBIT_S,
-    DATA_RATE_MBIT_S,
     MAX_GAP_COUNT,
-    PACKET_OVERHEAD_BYTES,
-    PHY_DELAY_HALF_WIDTH_US,
-    REFERENCE_CABLE_M,
+    c,
 )
 from busplan.buses.ieee1394.timing import (
     Delays,
@@ -28,10 +22,8 @@ from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Excha
 from busplan.buses.network import Network
 from busplan.buses.published import Spread, rows_of
 from busplan.elementwise import Number, choose, is_off, larger, named, total, traced_with
-from busplan.sourced import Sourced
+from busplan.sourced import Sourced, cached
 
-_BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REFERENCE_CABLE_M))
-"""The way of a packet on the bench."""
 _RECTANGULAR: Final = sqrt(3)
 """Half of a range over its standard uncertainty (JCGM 100, 4.3.7)."""
 
@@ -44,7 +36,7 @@ class ModelResidual(NamedTuple):
     """Standard uncertainty of the next half: `Spread`."""
 
 
-@cache
+@cached(maxsize=16)
 def residual(model: TimingModelName = "standard") -> ModelResidual:
     """Residual of T1 + T2, equation (13), over the rows of Table I.
 
@@ -58,15 +50,17 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
     >>> round(residual().mean_us, 3), round(residual("paper").mean_us, 3)
     (0.827, 3.131)
     """
+    # The way of a packet on the bench.
+    bench = Link(float(c.by_key("DATA_RATE_MBIT_S")["S400"]), MAX_GAP_COUNT, 1, float(c.REFERENCE_CABLE_M))
     differences = []
     for row in rows_of("paper", "bias and U"):
         phases = transaction(
             "write",
             model=model,
-            delays=delays(_BENCH, model=model),
+            delays=delays(bench, model=model),
             payload_bytes=row["set"]["payload.write_bytes"],
             responder=Responder(0.0),
-            overhead_bytes=int(PACKET_OVERHEAD_BYTES),
+            overhead_bytes=int(c.PACKET_OVERHEAD_BYTES),
         )
         differences.append(row["published"] - float(phases.request_and_acknowledge_us))
     spread = Spread.of(differences)
@@ -93,8 +87,8 @@ def gap_term_us(gap_count: Number, *, measured: Number = MAX_GAP_COUNT, symbol: 
     symbol
         Symbol in a derivation.
     """
-    ticks = traced_with(ARBITRATION_GAP_TICKS, gap_count) / 2
-    return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
+    ticks = traced_with(c.ARBITRATION_GAP_TICKS, gap_count) / 2
+    return named(ticks * (measured - gap_count) / c.BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
 
 
 def bias_us(exchanges: Sequence[Exchange], network: Network, *, link: Link) -> Number:
@@ -213,7 +207,7 @@ def of_inputs(
     if not link.has_gaps:
         # What is left out of a lower bound has no doubt of its own: no verdict rests on the bound but "does not fit".
         residual_us = gap_term_us = phy_delays = 0.0
-    half_width_us = traced_with(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
+    half_width_us = traced_with(c.PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
     return (
         Doubt("residual", "residual of Table I", residual_us),
         Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),

@@ -14,21 +14,8 @@ Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 42
 """
 
 from busplan.buses.ieee1394.constants import (
-    ARBITRATION_GAP_TICKS,
-    ARBITRATION_HOLD_US,
     BITS_PER_BYTE,
-    CABLE_DELAY_US,
-    DATA_END_US,
-    DATA_RATE_MBIT_S,
-    EQ15_CONSTANT_US,
-    GAPS_TICKS,
-    GAPS_TICKS_PER_COUNT,
-    PHY_DELAY_TICKS,
-    REFERENCE_CABLE_M,
-    RESET_GAP_TICKS,
-    RESET_GAP_TICKS_PER_COUNT,
-    SUBACTION_GAP_TICKS,
-    SUBACTION_GAP_TICKS_PER_COUNT,
+    c,
 )
 from busplan.elementwise import Number
 from busplan.sourced import SYMBOLS, published
@@ -126,7 +113,7 @@ def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
     >>> round(phy_delay_us(98.304), 6)
     0.142415
     """
-    return PHY_DELAY_TICKS / gap_clock_mbit_s
+    return c.PHY_DELAY_TICKS / gap_clock_mbit_s
 
 
 @published(
@@ -157,7 +144,7 @@ def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
     >>> round(hop_delay_us(4.5, phy_delay_us=0.144), 6)
     0.167
     """
-    return CABLE_DELAY_US * cable_length_m / REFERENCE_CABLE_M + phy_delay_us
+    return c.CABLE_DELAY_US * cable_length_m / c.REFERENCE_CABLE_M + phy_delay_us
 
 
 @published(4, symbol="ArbP", section="III-E")
@@ -190,7 +177,7 @@ def arbitration_phase_us(hops: Number, *, hop_us: Number, gap_count: Number, gap
     >>> round(arbitration_phase_us(1, hop_us=0.0586, gap_count=63, gap_clock_mbit_s=393.216), 4)
     2.3295
     """
-    return hop_us * hops + ARBITRATION_GAP_TICKS * gap_count / gap_clock_mbit_s + ARBITRATION_HOLD_US
+    return hop_us * hops + c.ARBITRATION_GAP_TICKS * gap_count / gap_clock_mbit_s + c.ARBITRATION_HOLD_US
 
 
 @published(5, symbol="DTP", section="III-E")
@@ -247,7 +234,7 @@ def acknowledge_phase_us(hops: Number, *, hop_us: Number) -> Number:
     >>> round(acknowledge_phase_us(1, hop_us=0.0586), 4)
     0.3086
     """
-    return hop_us * hops + DATA_END_US
+    return hop_us * hops + c.DATA_END_US
 
 
 @published(7, symbol="T_req", section="III-E")
@@ -346,7 +333,7 @@ def subaction_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     >>> round(subaction_gap_us(63, gap_clock_mbit_s=98.304), 4)
     10.5489
     """
-    return (SUBACTION_GAP_TICKS + SUBACTION_GAP_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
+    return (c.SUBACTION_GAP_TICKS + c.SUBACTION_GAP_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
 
 
 @published(10, symbol="T_reset", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
@@ -375,7 +362,7 @@ def arbitration_reset_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> 
     >>> round(arbitration_reset_gap_us(63, gap_clock_mbit_s=98.304), 4)
     21.047
     """
-    return (RESET_GAP_TICKS + RESET_GAP_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
+    return (c.RESET_GAP_TICKS + c.RESET_GAP_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
 
 
 @published(10, symbol="T_sum", section="III-E")
@@ -404,7 +391,7 @@ def gaps_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     >>> round(gaps_us(63, gap_clock_mbit_s=393.216), 2), round(gaps_us(63, gap_clock_mbit_s=98.304), 2)
     (7.9, 31.6)
     """
-    return (GAPS_TICKS + GAPS_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
+    return (c.GAPS_TICKS + c.GAPS_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
 
 
 @published(11, symbol="N", section="III-E")
@@ -539,4 +526,4 @@ def published_request_and_acknowledge_us(payload_bytes: Number) -> Number:
     >>> round(published_request_and_acknowledge_us(1024), 2)
     23.94
     """
-    return EQ15_CONSTANT_US + BITS_PER_BYTE * payload_bytes / float(DATA_RATE_MBIT_S["S400"])
+    return c.EQ15_CONSTANT_US + BITS_PER_BYTE * payload_bytes / float(c.by_key("DATA_RATE_MBIT_S")["S400"])

@@ -7,12 +7,8 @@ from typing import Any, Final
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.broadcast import BroadcastCycle, hub_block_bytes
 from busplan.buses.ieee1394.constants import (
-    ARBITRATION_GAP_TICKS,
-    ARBITRATION_HOLD_US,
     BITS_PER_BYTE,
-    DATA_END_US,
-    DATA_RATE_MBIT_S,
-    REFERENCE_CABLE_M,
+    c,
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
@@ -20,16 +16,15 @@ from busplan.buses.ieee1394.doubts import residual
 from busplan.buses.published import published
 from busplan.elementwise import plain
 
-_S400: Final = DATA_RATE_MBIT_S["S400"]
-
 
 def equation_15_constant_us(_cycle: object, *, nodes: int, gap_count: int, overhead_bytes: int, rounded: bool) -> float:
     """The constant of equation (15): the terms of equations (4)-(6), each rounded to two decimals or not [us]."""
-    hop_us = nodes * equations.hop_delay_us(REFERENCE_CABLE_M, phy_delay_us=equations.phy_delay_us(_S400))
+    s400 = c.by_key("DATA_RATE_MBIT_S")["S400"]
+    hop_us = nodes * equations.hop_delay_us(c.REFERENCE_CABLE_M, phy_delay_us=equations.phy_delay_us(s400))
     terms_us = (
-        *(hop_us, ARBITRATION_GAP_TICKS * gap_count / _S400, ARBITRATION_HOLD_US),
-        *(hop_us, BITS_PER_BYTE * overhead_bytes / _S400),
-        *(hop_us, DATA_END_US),
+        *(hop_us, c.ARBITRATION_GAP_TICKS * gap_count / s400, c.ARBITRATION_HOLD_US),
+        *(hop_us, BITS_PER_BYTE * overhead_bytes / s400),
+        *(hop_us, c.DATA_END_US),
     )
     return sum(round(float(term_us), 2) if rounded else float(term_us) for term_us in terms_us)
 

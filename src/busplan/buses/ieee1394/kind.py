@@ -6,15 +6,9 @@ from typing import ClassVar, Final
 from busplan.buses.bus import Bus
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
-    CONSTANTS,
     MAX_GAP_COUNT,
-    MAX_PAYLOAD_BYTES,
-    PACKET_OVERHEAD_BYTES,
-    PING_PER_NODE_US,
-    PING_US,
     QUADLET_BYTES,
-    REFERENCE_CABLE_M,
-    SLICE_RATIO,
+    c,
 )
 from busplan.buses.ieee1394.cycle import EVENTS, STRETCHES, CycleWithStarts, Ieee1394Cycle
 from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
@@ -149,18 +143,18 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
-    constants = CONSTANTS
+    constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
         "bus.max_hops": Key(meaning="rewired as a tree"),
         "bus.speed": Key(meaning="if all nodes can"),
-        "bus.cable_length_m": Key(default=REFERENCE_CABLE_M, role="cable"),
-        "cycle.slice_ratio": Key(default=SLICE_RATIO),
+        "bus.cable_length_m": Key(default="REFERENCE_CABLE_M", role="cable"),
+        "cycle.slice_ratio": Key(default="SLICE_RATIO"),
         "cycle.schedule": Key(meaning="if the firmware of all nodes can"),
-        "cycle.sync.ping_us": Key("ping", PING_US),
-        "cycle.sync.ping_per_node_us": Key("ping_node", PING_PER_NODE_US),
+        "cycle.sync.ping_us": Key("ping", "PING_US"),
+        "cycle.sync.ping_per_node_us": Key("ping_node", "PING_PER_NODE_US"),
         "host.transaction_us": Key("T_host", role="host"),
-        "payload.overhead_bytes": Key("overhead", PACKET_OVERHEAD_BYTES),
+        "payload.overhead_bytes": Key("overhead", "PACKET_OVERHEAD_BYTES"),
         "node.read_response": Key(meaning="if the nodes can"),
         "node.write_response": Key(meaning="if the nodes can"),
         "node.response_us": Key("T_hold"),
@@ -242,7 +236,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads of whole quadlets, up to the largest packet of the speed."""
         speed = network.profile.bus.speed
-        return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), carrier=speed)
+        return PayloadRange(QUADLET_BYTES, int(c.by_key("MAX_PAYLOAD_BYTES")[speed]), carrier=speed)
 
     def path_words(self, network: Network) -> str:
         """Say whose hops each node is charged."""
@@ -267,7 +261,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         warnings = [unsafe_words(sized) for sized in sizes if not self.is_safe(sized)][:1]
         if has_gaps(network) and not bus.cable_is_standard:
             warnings.append(
-                f"cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
+                f"cables of {bus.cable_length_m:g} m are longer than the {c.REFERENCE_CABLE_M:g} m that the "
                 "gap-count table holds for"
             )
         return warnings

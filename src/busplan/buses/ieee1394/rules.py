@@ -10,15 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from busplan.buses.ieee1394.broadcast import hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
-    CYCLE_US,
-    LEAST_ASYNCHRONOUS_US,
-    MAX_BROADCAST_NODES,
     MAX_GAP_COUNT,
-    MAX_HOPS,
-    MAX_NODES,
-    MAX_PAYLOAD_BYTES,
     QUADLET_BYTES,
-    REFERENCE_CABLE_M,
+    c,
     padded_bytes,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
@@ -35,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def _most_payload(network: Network) -> Number:
-    return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
+    return c.by_key("MAX_PAYLOAD_BYTES")[network.profile.bus.speed]
 
 
 def _of_broadcast(value: Callable[[Network], Number]) -> Callable[[Network], Number]:
@@ -55,7 +49,7 @@ def _cycle_start_us(network: Network) -> Number:
 def unsafe_words(network: Network) -> str:
     """Say which gap count is unsafe for which hops, and which is the smallest safe one; of plain numbers."""
     hops, nodes = hops_of(network), plural(int(plain(network.nodes)), "node")
-    cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
+    cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {c.REFERENCE_CABLE_M:g} m"
     return (
         f"gap count {gap_count_of(network)} is unsafe for {plural(int(plain(hops)), 'hop')} ({nodes}); "
         f"the smallest safe one is {safe_gap_count_of(network)}{cables}"
@@ -73,20 +67,20 @@ LIMITS: Final = (
         way_out="a faster bus or a smaller payload would do",
         has_rule=True,
     ),
-    nodes_limit("nodes", MAX_NODES, "bus", of="of one", has_rule=True),
+    nodes_limit("nodes", lambda: c.MAX_NODES, "bus", of="of one", has_rule=True),
     Limit(
         "hops",
         "{value:.0f} hops are over the {most:.0f} of one bus",
         hops_of,
-        lambda _network: MAX_HOPS,
-        way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
+        lambda _network: c.MAX_HOPS,
+        way_out="a tree with bus.max_hops = {c.MAX_HOPS:g} or less has room for {c.MAX_NODES:g} nodes",
         has_rule=True,
     ),
     Limit(
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
         _of_broadcast(lambda network: network.nodes),
-        lambda _network: MAX_BROADCAST_NODES,
+        lambda _network: c.MAX_BROADCAST_NODES,
         way_out=_ONE_BY_ONE,
     ),
     Limit(
@@ -107,7 +101,7 @@ LIMITS: Final = (
         "cycle starts",
         "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
         _cycle_start_us,
-        lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US,
+        lambda _network: c.CYCLE_US - c.LEAST_ASYNCHRONOUS_US,
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
     Limit(
@@ -123,7 +117,7 @@ LIMITS: Final = (
         unsafe_words,
         safe_gap_count_of,
         gap_count_of,
-        way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
+        way_out="for cables of more than {c.REFERENCE_CABLE_M:g} m none is known to be safe",
         role="safety",
     ),
 )
@@ -169,17 +163,17 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "hops" in subject.deciding.exceeded:
         is_chain = _bus(subject).max_hops is None
         key = subject.profile.node_groups[-1].nodes_key if is_chain else "bus.max_hops"
-        way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if is_chain else "rewire the tree"
+        way_out = f"a tree with bus.max_hops = {c.MAX_HOPS:g} or less would do" if is_chain else "rewire the tree"
         yield RuleProblem(key, subject.limit_words("hops"), way_out)
 
 
 def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A payload larger than an asynchronous packet of this speed carries."""
     speed = _bus(subject).speed
-    most = int(MAX_PAYLOAD_BYTES[speed])
+    most = int(c.by_key("MAX_PAYLOAD_BYTES")[speed])
     for key, size in _payloads(subject):
         if size > most:
-            faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if size <= limit]
+            faster = [speed for speed, limit in c.by_key("MAX_PAYLOAD_BYTES").items() if size <= limit]
             way_out = f'bus.speed = "{faster[0]}" would do' if faster else "share it out among several transactions"
             yield RuleProblem(key, f"{size} bytes are over the {most} bytes of a packet at {speed}", way_out)
 

@@ -6,15 +6,9 @@ from typing import Annotated, Final, Literal
 from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
 
 from busplan.buses.ieee1394.constants import (
-    ARBITRATION_HOLD_US,
-    CYCLE_US,
     MAX_GAP_COUNT,
-    PACKET_OVERHEAD_BYTES,
-    PING_PER_NODE_US,
-    PING_US,
-    REFERENCE_CABLE_M,
-    SLICE_RATIO,
     Speed,
+    c,
 )
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.elementwise import Number, choose
@@ -67,7 +61,7 @@ class Ieee1394Bus(BusSection):
         examples=[3],
     )
     cable_length_m: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = Field(
-        default=float(REFERENCE_CABLE_M), description="Length of one cable [m]", examples=[4.5]
+        default_factory=lambda: float(c.REFERENCE_CABLE_M), description="Length of one cable [m]", examples=[4.5]
     )
     charge_hops: Literal["farthest", "own"] = Field(
         default="farthest",
@@ -92,7 +86,7 @@ class Ieee1394Bus(BusSection):
         "(Linux, ohci.c)",
         examples=[True],
     )
-    isochronous_us: Annotated[float, Field(ge=0, le=float(CYCLE_US), allow_inf_nan=False)] = Field(
+    isochronous_us: Annotated[float, Field(ge=0, le=float(c.unchanged["CYCLE_US"]), allow_inf_nan=False)] = Field(
         default=0.0,
         description="Isochronous traffic after each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
         examples=[20],
@@ -107,7 +101,7 @@ class Ieee1394Bus(BusSection):
     def _problems(self) -> Iterator[Problem]:
         if self.gap_count == "optimal" and not self.cable_is_standard:
             message = (
-                f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
+                f"the table behind it holds for cables of up to {c.REFERENCE_CABLE_M:g} m, "
                 f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number"
             )
             yield Problem(message, "gap_count", "inconsistent")
@@ -118,19 +112,19 @@ class Ieee1394Bus(BusSection):
     @property
     def cable_is_standard(self) -> bool:
         """Whether the cable is no longer than those that the gap-count table holds for."""
-        return self.cable_length_m <= REFERENCE_CABLE_M
+        return self.cable_length_m <= c.REFERENCE_CABLE_M
 
 
 class Sync(Section):
     """Section [cycle.sync]: the synchronous packet that opens a cycle, CTS of equation (2)."""
 
     ping_us: TimeUs = Field(
-        default=float(PING_US),
+        default_factory=lambda: float(c.PING_US),
         description="Latency of a ping to one node, measured; used by the paper model alone [us]",
         examples=[0.3],
     )
     ping_per_node_us: TimeUs = Field(
-        default=float(PING_PER_NODE_US),
+        default_factory=lambda: float(c.PING_PER_NODE_US),
         description="What each further node adds, measured; used by the paper model alone [us]",
         examples=[0.1],
     )
@@ -139,7 +133,7 @@ class Sync(Section):
 class Ieee1394CycleSection(CycleSection):
     """Section [cycle]: the communication period and what of it is for communication."""
 
-    slice_ratio: SliceRatio = float(SLICE_RATIO)
+    slice_ratio: SliceRatio = Field(default_factory=lambda: float(c.SLICE_RATIO))
     schedule: Literal["individual", "broadcast"] = Field(
         default="individual",
         description="individual: a read and a write of each node; broadcast: one query, after which each node "
@@ -164,7 +158,7 @@ class Ieee1394Payload(PayloadSection):
     """Section [payload]: what is read from and written to each node in a cycle."""
 
     overhead_bytes: Bytes = Field(
-        default=int(PACKET_OVERHEAD_BYTES),
+        default_factory=lambda: int(c.PACKET_OVERHEAD_BYTES),
         description="Overhead of a packet in the paper model; the standard model uses real sizes [bytes]",
         examples=[20],
     )
@@ -194,6 +188,9 @@ class Ieee1394TableExecution(TableExecution, FittedExecution):
     """Section [node.execution] of kind "table": measured times, linear between them, nothing beyond them."""
 
 
+_HoldUs = Annotated[float, Field(ge=0, le=float(c.unchanged["ARBITRATION_HOLD_US"]), allow_inf_nan=False)]
+
+
 class Ieee1394Node(NodeSection):
     """Section [node]: a distributed node, and how it answers."""
 
@@ -211,8 +208,8 @@ class Ieee1394Node(NodeSection):
         description="How a node answers a write: split, it sends a response; unified, its acknowledge is the answer",
         examples=["unified"],
     )
-    response_us: Annotated[float, Field(ge=0, le=float(ARBITRATION_HOLD_US), allow_inf_nan=False)] = Field(
-        default=float(ARBITRATION_HOLD_US),
+    response_us: _HoldUs = Field(
+        default_factory=lambda: float(c.ARBITRATION_HOLD_US),
         description="Time from the acknowledge to a concatenated response; hardware slower than MAX_BUS_HOLD, 1.63 us "
         "(recalled), answers split. Used only for concatenated answers [us]",
         examples=[0.5],

@@ -8,7 +8,7 @@ from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
-from busplan.buses.polled.protocols import ADAPTER_SHARE, BUFFERED, Protocol, Requests, Times, protocol_of, times
+from busplan.buses.polled.protocols import BUFFERED, Protocol, Requests, Times, c, protocol_of, times
 from busplan.elementwise import Number, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
@@ -231,7 +231,9 @@ class PolledCycle(BusCycle):
         half_us = 0.0 if self.is_typical else (between.longest_turn - between.typical_turn) / 2
         doubts = [
             Doubt("bus.max_turn_bits", "turn-around of a node", answers * half_us / 2),
-            Doubt("bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * ADAPTER_SHARE),
+            Doubt(
+                "bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * c["SHARES[ADAPTER_SHARE]"]
+            ),
         ]
         if self.network.profile.bus.protocol not in BUFFERED:
             for group in groups:

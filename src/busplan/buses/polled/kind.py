@@ -18,7 +18,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
-from busplan.buses.polled.protocols import BUFFERED, CONSTANTS, protocol_of
+from busplan.buses.polled.protocols import BUFFERED, c, protocol_of
 from busplan.elementwise import Number, larger, plain
 
 _RATES_KBIT_S: Final = {
@@ -133,7 +133,7 @@ class Polled(Bus):
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
     rate_keys = ("bus.bit_rate_kbit_s",)
-    constants = CONSTANTS
+    constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.protocol": Key(chooses=True),
         "bus.nodes": Key(meaning="the others on a second bus"),

@@ -7,15 +7,10 @@ from pydantic import Field
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, total
 from busplan.sections.base import Bytes, Count, Section, TimeUs
-from busplan.sourced import Constants
+from busplan.sourced import Constants, cached
 
-CONSTANTS: Final = Constants("busplan.buses.polled")
+c: Final = Constants("busplan.buses.polled")
 """Constants with a source, by their names here."""
-ADAPTER_SHARE: Final = CONSTANTS["SHARES[ADAPTER_SHARE]"]
-MAX_DELAY_BITS: Final = CONSTANTS.by_key("MAX_DELAY_BITS")
-SLOT_BITS: Final = CONSTANTS.by_key("SLOT_BITS")
-SETUP_BITS: Final = CONSTANTS.by_key("SETUP_BITS")
-QUIET_BITS: Final = CONSTANTS.by_key("QUIET_BITS")
 _RATE_STEPS_KBIT_S: Final = (187.5, 500, 1500, 3000, 6000)
 """Highest bit rate of each column but the last of PROFIBUS' time ratios [kbit/s]."""
 
@@ -70,26 +65,28 @@ class Protocol(Section):
         return tuple(way for way, size in ways.items() if not is_everywhere(size <= 0))
 
 
+@cached(maxsize=16)
 def _shipped(name: str) -> Protocol:
     """A protocol of the constants, whose values keep their sources."""
-    values: Any = {key.lower(): value for key, value in CONSTANTS.by_key(name).items()}
+    values: Any = {key.lower(): value for key, value in c.by_key(name).items()}
     return Protocol.model_construct(**{key: value for key, value in values.items() if key in Protocol.model_fields})
 
 
-PROTOCOLS: Final[dict[str, Protocol]] = {
-    "profibus-dp": _shipped("PROFIBUS"),
-    "modbus-rtu": _shipped("MODBUS"),
-    "dynamixel-2": _shipped("DYNAMIXEL"),
-    "feetech": _shipped("FEETECH"),
-    "worldfip": _shipped("WORLDFIP"),
+_CONSTANTS: Final[dict[str, str]] = {
+    "profibus-dp": "PROFIBUS",
+    "modbus-rtu": "MODBUS",
+    "dynamixel-2": "DYNAMIXEL",
+    "feetech": "FEETECH",
+    "worldfip": "WORLDFIP",
 }
+"""Name of the constants of each protocol."""
 BUFFERED: Final = ("profibus-dp", "worldfip")
 """Protocols whose nodes answer from a buffer: their execution runs beside the telegrams."""
 
 
 def protocol_of(bus: Any) -> Protocol:
     """The protocol of a section [bus]."""
-    return PROTOCOLS[bus.protocol] if isinstance(bus.protocol, str) else bus.protocol
+    return _shipped(_CONSTANTS[bus.protocol]) if isinstance(bus.protocol, str) else bus.protocol
 
 
 class Times(NamedTuple):
@@ -141,7 +138,7 @@ def _profibus(bus: Any, bit_us: Number) -> Times:
     Once a cycle the master passes the token to itself, T_SYN + token + T_ID2, and asks an address of the GAP that
     nobody has, T_SYN + SD1 + T_SL (Felser, PROFIBUS manual, calculation for single masters).
     """
-    own = CONSTANTS.by_key("PROFIBUS")
+    own = c.by_key("PROFIBUS")
     place = total(choose(bus.bit_rate_kbit_s > step, 1, 0) for step in _RATE_STEPS_KBIT_S)
 
     def at_rate(table: Any, words: str) -> Number:
@@ -149,10 +146,10 @@ def _profibus(bus: Any, bit_us: Number) -> Times:
 
     max_bits: Number = bus.max_turn_bits
     if bus.max_turn_bits is None:
-        max_bits = at_rate(MAX_DELAY_BITS, "max T_SDR of the bit rate")
-    slot_bits = at_rate(SLOT_BITS, "T_SL of the bit rate")
-    setup_bits = 2 * at_rate(SETUP_BITS, "T_SET of the bit rate")
-    after_bits = own["IDLE_BITS"] + setup_bits + at_rate(QUIET_BITS, "T_QUI of the bit rate")
+        max_bits = at_rate(c.by_key("MAX_DELAY_BITS"), "max T_SDR of the bit rate")
+    slot_bits = at_rate(c.by_key("SLOT_BITS"), "T_SL of the bit rate")
+    setup_bits = 2 * at_rate(c.by_key("SETUP_BITS"), "T_SET of the bit rate")
+    after_bits = own["IDLE_BITS"] + setup_bits + at_rate(c.by_key("QUIET_BITS"), "T_QUI of the bit rate")
     silent_bits = larger(after_bits, max_bits)
     before_bits, byte_bits = own["SYNCHRONISATION_BITS"], own["BITS_PER_BYTE"]
     token_bits = before_bits + own["TOKEN_BYTES"] * byte_bits + silent_bits

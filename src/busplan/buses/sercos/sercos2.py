@@ -15,22 +15,8 @@ from busplan.sourced import Constants
 DataRate = Literal[2, 4, 8, 16]
 """Data rates [Mbit/s]."""
 
-CONSTANTS: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos2.toml")
+c: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos2.toml")
 """Constants with a source, by their names here."""
-BITS_PER_BYTE: Final = CONSTANTS["BITS_PER_BYTE"]
-FLAG_BITS: Final = CONSTANTS["FLAG_BITS"]
-STUFF_STEP_BITS: Final = CONSTANTS["STUFF_STEP_BITS"]
-FRAME_BYTES: Final = CONSTANTS["FRAME_BYTES"]
-MST_BYTES: Final = CONSTANTS["MST_BYTES"]
-RECORD_BYTES: Final = CONSTANTS["RECORD_BYTES"]
-MOST_MDT_BYTES: Final = CONSTANTS["MOST_MDT_BYTES"]
-MOST_DRIVE_BYTES: Final = CONSTANTS["MOST_DRIVE_BYTES"]
-MOST_DRIVES: Final = CONSTANTS["MOST_DRIVES"]
-SLOW_MBIT_S: Final = CONSTANTS["SLOW_MBIT_S"]
-SLOW_START_US: Final = CONSTANTS["SLOW_START_US"]
-FAST_START_US: Final = CONSTANTS["FAST_START_US"]
-TURNAROUND_US: Final = CONSTANTS["TURNAROUND_US"]
-GAP_SHARE: Final = CONSTANTS["GAP_SHARE"]
 
 _STEP_US: Final = 1000
 _LONGEST_US: Final = 65_000
@@ -58,9 +44,9 @@ def telegram_bits(data_bytes: Number, *, is_stuffed: bool) -> Number:
     >>> telegram_bits(1, is_stuffed=True), telegram_bits(1, is_stuffed=False)
     (54.0, 48.0)
     """
-    stuffable: Number = (data_bytes + FRAME_BYTES) * BITS_PER_BYTE
-    bits = stuffable + FLAG_BITS
-    return bits + rounded_down(stuffable / STUFF_STEP_BITS) if is_stuffed else bits
+    stuffable: Number = (data_bytes + c.FRAME_BYTES) * c.BITS_PER_BYTE
+    bits = stuffable + c.FLAG_BITS
+    return bits + rounded_down(stuffable / c.STUFF_STEP_BITS) if is_stuffed else bits
 
 
 def telegram_us(data_bytes: Number, *, data_rate_mbit_s: Number, is_stuffed: bool) -> Number:
@@ -89,7 +75,7 @@ def start_us(data_rate_mbit_s: Number) -> Number:
     >>> start_us(4), start_us(16)
     (12.0, 4.0)
     """
-    return choose(data_rate_mbit_s > SLOW_MBIT_S, FAST_START_US, SLOW_START_US)
+    return choose(data_rate_mbit_s > c.SLOW_MBIT_S, c.FAST_START_US, c.SLOW_START_US)
 
 
 _IEC: Final = "IEC 61491"
@@ -168,7 +154,7 @@ class Sercos2Cycle(SercosCycle):
     def mdt_bytes(self) -> Number:
         """Data of the MDT, a record for each drive [bytes]."""
         data_bytes = total(
-            (word_bytes(group.write_bytes) + RECORD_BYTES) * group.nodes for group in self.network.groups
+            (word_bytes(group.write_bytes) + c.RECORD_BYTES) * group.nodes for group in self.network.groups
         )
         return named(data_bytes, "mdt_bytes", "s_MDT")
 
@@ -182,11 +168,11 @@ class Sercos2Cycle(SercosCycle):
     def written(self) -> Iterator[BusEvent | Run]:
         """MST, the telegrams of all drives, the MDT and its records, with the waits and gaps between them."""
         bus = self.network.profile.bus
-        yield BusEvent("mst", "cycle_mst_us", self._telegram_us(MST_BYTES), "MST")
+        yield BusEvent("mst", "cycle_mst_us", self._telegram_us(c.MST_BYTES), "MST")
         yield BusEvent("wait", "cycle_wait_us", self.start_us, "wait before the first AT")
         for place, group in enumerate(self.network.groups):
             rounds = ALL if place else BUT_FIRST
-            at_us = self._telegram_us(word_bytes(group.read_bytes) + RECORD_BYTES)
+            at_us = self._telegram_us(word_bytes(group.read_bytes) + c.RECORD_BYTES)
             gap = BusEvent("gap", "cycle_gap_us", bus.at_gap_us, _GAP, rests_on="bus.at_gap_us", rounds=rounds)
             at = BusEvent("at", "cycle_at_us", at_us, "AT of a drive", transaction="at_stretch")
             yield Run((gap, at), group.nodes, place)
@@ -198,7 +184,7 @@ class Sercos2Cycle(SercosCycle):
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The gap between two drives, which is the same in the whole cycle."""
-        return (Doubt("bus.at_gap_us", "gap between two drives", self.by_term["cycle_gap_us"] * GAP_SHARE),)
+        return (Doubt("bus.at_gap_us", "gap between two drives", self.by_term["cycle_gap_us"] * c.GAP_SHARE),)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The drives' recovery after the MDT."""
@@ -226,7 +212,7 @@ class Sercos2Cycle(SercosCycle):
         """The record of each drive, then all else of the MDT: flags, address, check sequence and stuff bits."""
         rate, records_us, node = plain(self.network.profile.bus.data_rate_mbit_s), 0.0, 0
         for group in self.network.groups:
-            record_us = 8 * (plain(word_bytes(group.write_bytes)) + RECORD_BYTES) / rate
+            record_us = 8 * (plain(word_bytes(group.write_bytes)) + c.RECORD_BYTES) / rate
             for _ in range(int(plain(group.nodes))):
                 node += 1
                 records_us += record_us

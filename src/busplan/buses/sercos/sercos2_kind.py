@@ -15,20 +15,16 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.sercos.sercos2 import (
-    CONSTANTS,
     EVENTS,
     FIGURES,
-    MOST_DRIVE_BYTES,
-    MOST_DRIVES,
-    MOST_MDT_BYTES,
     NONE,
     PERIODS,
     STRETCHES,
-    TURNAROUND_US,
     WORST,
     Sercos2Cycle,
+    c,
 )
-from busplan.buses.sercos.shared import KEYS, RULES, WORD_BYTES, SercosBus, starter
+from busplan.buses.sercos.shared import KEYS, RULES, SercosBus, starter
 from busplan.elementwise import plain
 
 _FASTEST: Final = 16
@@ -36,12 +32,12 @@ _FASTEST: Final = 16
 LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
-    nodes_limit("drives", MOST_DRIVES, "ring"),
+    nodes_limit("drives", lambda: c.MOST_DRIVES, "ring"),
     Limit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
         lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
-        lambda _network: MOST_MDT_BYTES,
+        lambda _network: c.MOST_MDT_BYTES,
         way_out="a smaller payload or a second ring would do",
     ),
 )
@@ -71,13 +67,13 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
-    constants = CONSTANTS
+    constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second ring"),
         "bus.data_rate_mbit_s": Key("f"),
         "bus.at_gap_us": Key("t_gap", grade="assumed"),
         "bus.at_start_us": Key("t_1"),
-        "bus.turnaround_us": Key("t_ATMT", TURNAROUND_US),
+        "bus.turnaround_us": Key("t_ATMT", "TURNAROUND_US"),
         "bus.recovery_us": Key("t_MTSY"),
         **KEYS,
     }
@@ -99,7 +95,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads of whole words, as many as a drive can be told to send for each of its axes."""
         axes = min((int(plain(group.axes)) for group in network.groups), default=1)
-        return PayloadRange(int(WORD_BYTES), int(MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
+        return PayloadRange(int(c.WORD_BYTES), int(c.MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The data rate and the gap."""

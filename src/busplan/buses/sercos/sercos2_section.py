@@ -4,8 +4,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from busplan.buses.sercos.sercos2 import TURNAROUND_US, WORST, DataRate, TimingModelName
-from busplan.buses.sercos.shared import MOST_PIPELINE, PIPELINE_CYCLES
+from busplan.buses.sercos.sercos2 import WORST, DataRate, TimingModelName, c
+from busplan.buses.sercos.shared import MOST_PIPELINE
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
@@ -31,7 +31,7 @@ class Sercos2Bus(BusSection):
         examples=[12],
     )
     turnaround_us: TimeUs = Field(
-        default=float(TURNAROUND_US),
+        default_factory=lambda: float(c.TURNAROUND_US),
         description="From the last AT to the MDT, t_ATMT of the slowest drive (S-0-0004) [us]",
         examples=[12],
     )
@@ -41,7 +41,7 @@ class Sercos2Bus(BusSection):
         examples=[20],
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=MOST_PIPELINE)] = Field(
-        default=int(PIPELINE_CYCLES),
+        default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it, for a loop on the host; 0: the master "
         "computes within turnaround_us",
         examples=[2],

@@ -16,35 +16,11 @@ Version = Literal["V1.0", "V1.1"]
 TimingMethod = Literal["mdt-at-ucc", "mdt-ucc-at", "at-last"]
 HotPlug = Literal["first", "all"]
 
-CONSTANTS: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos3.toml")
+c: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos3.toml")
 """Constants with a source, by their names here."""
-BYTE_US: Final = CONSTANTS["BYTE_US"]
-OVERHEAD_BYTES: Final = CONSTANTS["OVERHEAD_BYTES"]
-HEADER_US: Final = CONSTANTS["HEADER_US"]
-LEAST_BYTES: Final = CONSTANTS["LEAST_BYTES"]
-MOST_BYTES: Final = CONSTANTS["MOST_BYTES"]
-HOT_PLUG_BYTES: Final = CONSTANTS["HOT_PLUG_BYTES"]
-EXTENDED_BYTES: Final = CONSTANTS["EXTENDED_BYTES"]
-ALIGNED_BYTES: Final = CONSTANTS["ALIGNED_BYTES"]
-CHANNEL_BYTES: Final = CONSTANTS["CHANNEL_BYTES"]
-DEVICE_BYTES: Final = CONSTANTS["DEVICE_BYTES"]
-CONNECTION_BYTES: Final = CONSTANTS["CONNECTION_BYTES"]
-MOST_TELEGRAMS: Final = CONSTANTS["MOST_TELEGRAMS"]
-MOST_DEVICES: Final = CONSTANTS["MOST_DEVICES"]
-DEFAULT_GAP_BYTES: Final = CONSTANTS["DEFAULT_GAP_BYTES"]
-LEAST_GAP_BYTES: Final = CONSTANTS["LEAST_GAP_BYTES"]
-DEVICE_DELAY_US: Final = CONSTANTS["DEVICE_DELAY_US"]
-COMPONENT_DELAY_US: Final = CONSTANTS["COMPONENT_DELAY_US"]
-MASTER_JITTER_US: Final = CONSTANTS["MASTER_JITTER_US"]
-MASTER_DELAY_US: Final = CONSTANTS["MASTER_DELAY_US"]
-CHANNEL_US: Final = CONSTANTS["CHANNEL_US"]
-HARDWARE_CHANNELS: Final = CONSTANTS["HARDWARE_CHANNELS"]
-DEVICE_DELAY_SHARE: Final = CONSTANTS.computed(
-    "DEVICE_DELAY_SHARE", (DEVICE_DELAY_US - 0.5) / sqrt(12) / DEVICE_DELAY_US
-)
-MASTER_JITTER_SHARE: Final = CONSTANTS.computed("MASTER_JITTER_SHARE", 1 / sqrt(12) / MASTER_JITTER_US)
-GAP_SHARE: Final = CONSTANTS.computed("GAP_SHARE", (DEFAULT_GAP_BYTES - LEAST_GAP_BYTES) / sqrt(12) / DEFAULT_GAP_BYTES)
-LEAST_UCC_US: Final = CONSTANTS["LEAST_UCC_US"]
+c.computed("DEVICE_DELAY_SHARE", lambda c: (c.DEVICE_DELAY_US - 0.5) / sqrt(12) / c.DEVICE_DELAY_US)
+c.computed("MASTER_JITTER_SHARE", lambda c: 1 / sqrt(12) / c.MASTER_JITTER_US)
+c.computed("GAP_SHARE", lambda c: (c.DEFAULT_GAP_BYTES - c.LEAST_GAP_BYTES) / sqrt(12) / c.DEFAULT_GAP_BYTES)
 
 _STEP_US: Final = 250
 _LONGEST_US: Final = 65_000
@@ -85,7 +61,7 @@ def padded_bytes(data_bytes: Number) -> Number:
     >>> padded_bytes(12), padded_bytes(100)
     (40.0, 100)
     """
-    return larger(data_bytes, LEAST_BYTES)
+    return larger(data_bytes, c.LEAST_BYTES)
 
 
 def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, name: str = "") -> Filling:
@@ -115,9 +91,9 @@ def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, n
 
 def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) -> Filling:
     size_bytes = items.size_bytes
-    room = larger(rounded_down((MOST_BYTES - before.open_bytes) / size_bytes), 0)
+    room = larger(rounded_down((c.MOST_BYTES - before.open_bytes) / size_bytes), 0)
     here = named(smaller(items.pieces, room), f"fit_{name}", f"k_{name}")
-    per_telegram = larger(rounded_down((MOST_BYTES - next_bytes) / size_bytes), 1)
+    per_telegram = larger(rounded_down((c.MOST_BYTES - next_bytes) / size_bytes), 1)
     more = rounded_up((items.pieces - here) / per_telegram)
     last = items.pieces - here - (more - 1) * per_telegram
     own_bytes = before.open_bytes + here * size_bytes
@@ -150,7 +126,7 @@ def telegrams_us(filling: Filling, *, gap_bytes: Number) -> Number:
     >>> telegrams_us(Filling(1, 0, 140), gap_bytes=12)
     14.72
     """
-    return (filling.data_bytes + filling.telegrams * (OVERHEAD_BYTES + gap_bytes)) * BYTE_US
+    return (filling.data_bytes + filling.telegrams * (c.OVERHEAD_BYTES + gap_bytes)) * c.BYTE_US
 
 
 def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
@@ -161,7 +137,7 @@ def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
     >>> sync_jitter_us(1.0, gap_bytes=25)
     1.5
     """
-    return (master_jitter_us + gap_bytes * BYTE_US) / 2
+    return (master_jitter_us + gap_bytes * c.BYTE_US) / 2
 
 
 def ring_delay_us(
@@ -174,7 +150,7 @@ def ring_delay_us(
     >>> ring_delay_us(8, device_delay_us=0.9, gap_bytes=25, component_delay_us=1.8)
     17.2
     """
-    return 2 * devices * device_delay_us + gap_bytes * BYTE_US / 2 + component_delay_us
+    return 2 * devices * device_delay_us + gap_bytes * c.BYTE_US / 2 + component_delay_us
 
 
 def start_wait_us(least_us: Number, *, earliest_us: Number) -> Number:
@@ -274,15 +250,15 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
     """
     is_in_all = network.profile.bus.hot_plug_field == "all"
     sizes = (group.write_bytes if kind == "write" else group.read_bytes for group in network.groups)
-    first_bytes = traced_with(HOT_PLUG_BYTES, network.nodes)
+    first_bytes = traced_with(c.HOT_PLUG_BYTES, network.nodes)
     if kind == "write":
-        first_bytes = first_bytes + EXTENDED_BYTES + (ALIGNED_BYTES if is_in_all else 0)
+        first_bytes = first_bytes + c.EXTENDED_BYTES + (c.ALIGNED_BYTES if is_in_all else 0)
     return Telegrams(
         first_bytes,
-        HOT_PLUG_BYTES if is_in_all else 0,
+        c.HOT_PLUG_BYTES if is_in_all else 0,
         (
-            Items(network.nodes, CHANNEL_BYTES),
-            Items(network.nodes, DEVICE_BYTES),
+            Items(network.nodes, c.CHANNEL_BYTES),
+            Items(network.nodes, c.DEVICE_BYTES),
             *(Items(group.nodes, data_bytes(network, size)) for group, size in zip(network.groups, sizes, strict=True)),
         ),
         SORTS[kind].upper(),
@@ -292,4 +268,4 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
 def data_bytes(network: Network, payload_bytes: Number) -> Number:
     """Cyclic data of a device in whole words, from V1.1 on with the control of its connection [bytes]."""
     words: Number = word_bytes(payload_bytes)
-    return words if network.profile.bus.version == "V1.0" else words + CONNECTION_BYTES
+    return words if network.profile.bus.version == "V1.0" else words + c.CONNECTION_BYTES

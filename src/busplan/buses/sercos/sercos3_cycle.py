@@ -9,20 +9,12 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Network
 from busplan.buses.sercos.sercos3 import (
-    BYTE_US,
-    CHANNEL_US,
-    DEVICE_DELAY_SHARE,
-    GAP_SHARE,
-    HARDWARE_CHANNELS,
-    HEADER_US,
-    MASTER_JITTER_SHARE,
     MDT_TELEGRAMS,
-    MOST_BYTES,
-    OVERHEAD_BYTES,
     SORTS,
     TERMS,
     Filling,
     Telegrams,
+    c,
     padded_bytes,
     ring_delay_us,
     start_wait_us,
@@ -116,8 +108,8 @@ class Sercos3Cycle(SercosCycle):
             return 0.0
         delay_us: Number = self.network.profile.bus.master_delay_us
         if self.method == "mdt-at-ucc":
-            return delay_us + HEADER_US
-        channels_us = smaller(self.network.nodes, HARDWARE_CHANNELS) * CHANNEL_US
+            return delay_us + c.HEADER_US
+        channels_us = smaller(self.network.nodes, c.HARDWARE_CHANNELS) * c.CHANNEL_US
         return larger(delay_us, channels_us - self.jitter_us)
 
     @cached_property
@@ -167,14 +159,16 @@ class Sercos3Cycle(SercosCycle):
             return ()
         jitters, rings = self._jitters[1], 1 if self._has_ring else 0
         count = total(filling.telegrams for filling in self.fillings.values())
-        gap_us: Number = bus.gap_bytes * BYTE_US * (count + (jitters + rings) / 2)
+        gap_us: Number = bus.gap_bytes * c.BYTE_US * (count + (jitters + rings) / 2)
         delays_us: Number = 2 * rings * self.network.nodes * bus.device_delay_us
         return (
-            Doubt("bus.gap_bytes", "gap between telegrams", gap_us * GAP_SHARE),
+            Doubt("bus.gap_bytes", "gap between telegrams", gap_us * c.GAP_SHARE),
             Doubt(
-                "bus.master_jitter_us", "jitter of the master", jitters / 2 * bus.master_jitter_us * MASTER_JITTER_SHARE
+                "bus.master_jitter_us",
+                "jitter of the master",
+                jitters / 2 * bus.master_jitter_us * c.MASTER_JITTER_SHARE,
             ),
-            Doubt("bus.device_delay_us", "delay of the devices", delays_us * DEVICE_DELAY_SHARE),
+            Doubt("bus.device_delay_us", "delay of the devices", delays_us * c.DEVICE_DELAY_SHARE),
         )
 
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -193,7 +187,7 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window:
             return 0.0
         delay_us: Number = self.network.profile.bus.master_delay_us
-        return larger(delay_us - HEADER_US, 0.0)
+        return larger(delay_us - c.HEADER_US, 0.0)
 
     @property
     def feedback_due_us(self) -> Number:
@@ -226,12 +220,12 @@ class Sercos3Cycle(SercosCycle):
             label, data = f"{sort.upper()}{number}", [(size, node) for size, node in telegram if node]
             used = sum(size for size, _ in telegram)
             fields = used - sum(size for size, _ in data)
-            head_us = (OVERHEAD_BYTES + fields) * BYTE_US
+            head_us = (c.OVERHEAD_BYTES + fields) * c.BYTE_US
             yield BusEvent(f"{sort}_frame", term, head_us, f"{label}: its own fields", None, sort)
             for size, node in data:
-                yield BusEvent(f"{sort}_data", term, size * BYTE_US, f"{label}: data of a device", node, sort)
-            padding_us = (plain(padded_bytes(used)) - used) * BYTE_US
-            yield BusEvent("gap", term, padding_us + gap * BYTE_US, f"gap after {label}", None, sort)
+                yield BusEvent(f"{sort}_data", term, size * c.BYTE_US, f"{label}: data of a device", node, sort)
+            padding_us = (plain(padded_bytes(used)) - used) * c.BYTE_US
+            yield BusEvent("gap", term, padding_us + gap * c.BYTE_US, f"gap after {label}", None, sort)
 
 
 def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
@@ -241,7 +235,7 @@ def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
     for place, items in enumerate(telegrams.items):
         size, has_owner = plain(items.size_bytes), place >= _FIELDS
         for _ in range(int(plain(items.pieces))):
-            if used + size > MOST_BYTES:
+            if used + size > c.MOST_BYTES:
                 used = plain(telegrams.next_bytes)
                 laid_out.append([(used, 0)])
             node += has_owner

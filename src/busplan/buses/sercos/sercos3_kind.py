@@ -18,25 +18,15 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.sercos.sercos3 import (
-    COMPONENT_DELAY_US,
-    CONNECTION_BYTES,
-    CONSTANTS,
-    DEFAULT_GAP_BYTES,
-    DEVICE_DELAY_US,
     FIGURES,
-    LEAST_UCC_US,
-    MASTER_DELAY_US,
-    MASTER_JITTER_US,
-    MOST_BYTES,
-    MOST_DEVICES,
-    MOST_TELEGRAMS,
     PERIODS,
     SORTS,
+    c,
     data_bytes,
     telegrams_of,
 )
 from busplan.buses.sercos.sercos3_cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
-from busplan.buses.sercos.shared import KEYS, RULES, WORD_BYTES, SercosBus, starter
+from busplan.buses.sercos.shared import KEYS, RULES, SercosBus, starter
 from busplan.elementwise import Number, larger, plain
 
 _METHOD: Final = "bus.timing_method"
@@ -54,19 +44,19 @@ def _largest_telegram(network: Network) -> Number:
 LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
-    nodes_limit("devices", MOST_DEVICES, "network"),
+    nodes_limit("devices", lambda: c.MOST_DEVICES, "network"),
     Limit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
         _largest_telegram,
-        lambda _network: MOST_BYTES,
+        lambda _network: c.MOST_BYTES,
         way_out="a smaller payload would do",
     ),
     Limit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
         _most_telegrams,
-        lambda _network: MOST_TELEGRAMS,
+        lambda _network: c.MOST_TELEGRAMS,
         way_out="a smaller payload or a second network would do",
     ),
 )
@@ -96,14 +86,14 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
-    constants = CONSTANTS
+    constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second network"),
-        "bus.gap_bytes": Key("gap", DEFAULT_GAP_BYTES),
-        "bus.device_delay_us": Key("t_dev", DEVICE_DELAY_US),
-        "bus.master_jitter_us": Key("J_master", MASTER_JITTER_US),
-        "bus.master_delay_us": Key("t_master", MASTER_DELAY_US),
-        "bus.component_delay_us": Key("t_comp", COMPONENT_DELAY_US),
+        "bus.gap_bytes": Key("gap", "DEFAULT_GAP_BYTES"),
+        "bus.device_delay_us": Key("t_dev", "DEVICE_DELAY_US"),
+        "bus.master_jitter_us": Key("J_master", "MASTER_JITTER_US"),
+        "bus.master_delay_us": Key("t_master", "MASTER_DELAY_US"),
+        "bus.component_delay_us": Key("t_comp", "COMPONENT_DELAY_US"),
         "bus.at_start_us": Key("t_1,min"),
         _METHOD: Key(meaning="a setting of the master"),
         **KEYS,
@@ -133,8 +123,10 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads of whole words: four telegrams carry those of all devices, one telegram that of a device."""
-        share = int(MOST_TELEGRAMS * MOST_BYTES) // int(plain(network.nodes))
-        return PayloadRange(int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), carrier="four telegrams")
+        share = int(c.MOST_TELEGRAMS * c.MOST_BYTES) // int(plain(network.nodes))
+        return PayloadRange(
+            int(c.WORD_BYTES), min(share, int(c.MOST_BYTES - c.CONNECTION_BYTES)), carrier="four telegrams"
+        )
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Version, timing method and gap."""
@@ -144,9 +136,9 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - whatever their number
         """A channel for other frames that the master does not open."""
         given_us = plain(network.nonperiodic_us)
-        if not 0 < given_us < LEAST_UCC_US:
+        if not 0 < given_us < c.LEAST_UCC_US:
             return []
-        why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
+        why = f"the master opens no channel for other frames of less than {c.LEAST_UCC_US:g} us"
         return [f"cycle.nonperiodic_us = {given_us:g}: {why}"]
 
 

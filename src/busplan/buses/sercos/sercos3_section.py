@@ -5,18 +5,13 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from busplan.buses.sercos.sercos3 import (
-    COMPONENT_DELAY_US,
-    DEFAULT_GAP_BYTES,
-    DEVICE_DELAY_US,
-    LEAST_GAP_BYTES,
-    MASTER_DELAY_US,
-    MASTER_JITTER_US,
     HotPlug,
     TimingMethod,
     Version,
+    c,
 )
 from busplan.buses.sercos.sercos3_cycle import WINDOW, TimingModelName
-from busplan.buses.sercos.shared import MOST_PIPELINE, PIPELINE_CYCLES
+from busplan.buses.sercos.shared import MOST_PIPELINE
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
@@ -42,26 +37,26 @@ class Sercos3Bus(BusSection):
         description="Order of MDT, AT and the channel for other frames (UCC); methods 1, 2 and 3 of CoSeMa",
         examples=["mdt-ucc-at"],
     )
-    gap_bytes: Annotated[int, Field(ge=int(LEAST_GAP_BYTES), le=1000)] = Field(
-        default=int(DEFAULT_GAP_BYTES),
+    gap_bytes: Annotated[int, Field(ge=int(c.unchanged["LEAST_GAP_BYTES"]), le=1000)] = Field(
+        default_factory=lambda: int(c.DEFAULT_GAP_BYTES),
         description="Gap between two telegrams, S-0-1036; more devices with more jitter need more [bytes]",
         examples=[12],
     )
     device_delay_us: TimeUs = Field(
-        default=float(DEVICE_DELAY_US), description="Delay of a device, one way [us]", examples=[0.6]
+        default_factory=lambda: float(c.DEVICE_DELAY_US), description="Delay of a device, one way [us]", examples=[0.6]
     )
     master_jitter_us: TimeUs = Field(
-        default=float(MASTER_JITTER_US),
+        default_factory=lambda: float(c.MASTER_JITTER_US),
         description="Jitter with which the master sends; CoSeMa demands an eighth of the period at most [us]",
         examples=[0.1],
     )
     master_delay_us: TimeUs = Field(
-        default=float(MASTER_DELAY_US),
+        default_factory=lambda: float(c.MASTER_DELAY_US),
         description="From the start of a cycle in the master to the end of the first header [us]",
         examples=[2.56],
     )
     component_delay_us: TimeUs = Field(
-        default=float(COMPONENT_DELAY_US),
+        default_factory=lambda: float(c.COMPONENT_DELAY_US),
         description="Delay of all other components in the ring [us]",
         examples=[1.8],
     )
@@ -78,7 +73,7 @@ class Sercos3Bus(BusSection):
         examples=["measured"],
     )
     pipeline_cycles: Annotated[int, Field(ge=1, le=MOST_PIPELINE)] = Field(
-        default=int(PIPELINE_CYCLES),
+        default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it, for a loop on the host",
         examples=[2],
     )

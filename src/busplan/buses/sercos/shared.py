@@ -15,10 +15,8 @@ from busplan.buses.rule import read_rules
 from busplan.elementwise import Number, larger, plain, rounded_up, total
 from busplan.sourced import Constants
 
-CONSTANTS: Final = Constants("busplan.buses.sercos", "shared.toml")
+c: Final = Constants("busplan.buses.sercos", "shared.toml")
 """Constants of all SERCOS with a source, by their names here."""
-WORD_BYTES: Final = CONSTANTS["WORD_BYTES"]
-PIPELINE_CYCLES: Final = CONSTANTS["PIPELINE_CYCLES"]
 
 RULES: Final = {
     rule.code: rule for rule in read_rules("busplan.buses.sercos", {"BP141": unknown_period, "BP151": unknown_period})
@@ -36,7 +34,7 @@ def word_bytes(payload_bytes: Number) -> Number:
     >>> word_bytes(5), word_bytes(6)
     (6.0, 6.0)
     """
-    return rounded_up(payload_bytes / WORD_BYTES) * WORD_BYTES
+    return rounded_up(payload_bytes / c.WORD_BYTES) * c.WORD_BYTES
 
 
 _CYCLE: Final = "cycle"
@@ -57,7 +55,7 @@ DELAYS: Final = (
 Sent: TypeAlias = tuple[Number, Number]
 """What the cycle sends before feedback or a command, and the telegrams that carry it [us]."""
 KEYS: Final[Mapping[str, Key]] = {
-    "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
+    "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
     "node.execution.worst_extra_us": Key("T_extra"),
 }
 

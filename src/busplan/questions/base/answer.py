@@ -4,10 +4,10 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from busplan.errors import BusplanError
 from busplan.extras import require_pyarrow, require_resvg
@@ -16,9 +16,28 @@ from busplan.forms import ENDINGS, Form, ending_expected, render
 from busplan.forms.blocks import Report, first_drawing
 from busplan.forms.charts import Drawing
 from busplan.forms.terminal import block_lines
+from busplan.sourced import changed_constants, constants_changed
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
 """Function that refuses a file whose library is not installed, by ending."""
+
+
+_Shown = TypeVar("_Shown")
+
+
+def _with_constants(method: Callable[..., _Shown]) -> Callable[..., _Shown]:
+    @wraps(method)
+    def drawn(answer: Any, *given: Any, **named: Any) -> _Shown:
+        profile = _profile_of(answer)
+        with constants_changed(changed_constants() if profile is None else profile.constants):
+            return method(answer, *given, **named)
+
+    return drawn
+
+
+def _profile_of(answer: Any) -> Any:
+    """The profile of an answer; None if it has none, or several."""
+    return getattr(answer, "profile", None) or getattr(getattr(answer, "network", None), "profile", None)
 
 
 class Answer(ABC):
@@ -29,9 +48,16 @@ class Answer(ABC):
 
     __slots__ = ()
 
+    def __init_subclass__(cls) -> None:
+        """Draw with the constants that were changed in the profile, for a report may compute."""
+        super().__init_subclass__()
+        for name in ("report", "drawing"):
+            if name in vars(cls):
+                setattr(cls, name, _with_constants(vars(cls)[name]))
+
     def to_json(self) -> str:
         """Return the document of the command's `--format json` as text."""
-        return render(self.report(), "json")
+        return render(self._named(), "json")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document of the command's `--format json` as new plain data."""
@@ -42,7 +68,7 @@ class Answer(ABC):
     @property
     def html(self) -> str:
         """The page of the command's `--format html`: one file without network or script."""
-        return render(self.report(), "html")
+        return render(self._named(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the answer to a file in the form that its ending names; an old file is replaced atomically.
@@ -109,15 +135,27 @@ class Answer(ABC):
         return document_bytes(content(self.drawing(), "png"))
 
     def _text(self, form: Form) -> str:
-        return self.to_json() if form == "json" else render(self.report(), form)
+        return self.to_json() if form == "json" else render(self._named(), form)
 
     @abstractmethod
     def report(self) -> Report:
         """The answer in blocks, from which every form but JSON and CSV is written."""
 
+    def _named(self) -> Report:
+        """The report, which names the constants that were changed, as the command line names --set."""
+        profile = _profile_of(self)
+        if profile is None or not profile.constants:
+            return self.report()
+        from busplan.questions.base.inputs import key_changes
+        from busplan.questions.base.sentences import changed_report
+
+        return changed_report(
+            self.report(), key_changes({f"constants.{name}": value for name, value in profile.constants})
+        )
+
     def _shown(self) -> Report:
         """The report with a pointer to `to_dict()`, where the command line points to an option."""
-        return self.report()._replace(whole_by="to_dict() has all figures.")
+        return self._named()._replace(whole_by="to_dict() has all figures.")
 
     def _headline(self) -> str:
         """The answer in one line."""

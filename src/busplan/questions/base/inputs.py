@@ -2,8 +2,9 @@
 
 import os
 import sys
-from collections.abc import Iterable, Mapping
-from typing import Any, Final, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from typing import Any, Final, ParamSpec, TypeVar, cast
 
 from busplan.buses.network import Network
 from busplan.english import listed
@@ -16,6 +17,7 @@ from busplan.profile.sources import load, shipped_names
 from busplan.questions.fit.network import model_names, network_of
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
+from busplan.sourced import constants_changed
 
 Path = str | os.PathLike[str]
 """A str may also be the name of a shipped profile; a path object is always a path."""
@@ -27,6 +29,8 @@ Models = str | Iterable[str]
 MOST_FLOAT: Final = sys.float_info.max
 
 _Item = TypeVar("_Item")
+_Parameters = ParamSpec("_Parameters")
+_Answer = TypeVar("_Answer")
 
 
 def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None = None) -> Profile:
@@ -39,7 +43,8 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
         "./paper-4ms" and path objects are always files.
     changes
         New values by dotted key, in the key's unit: {"bus.nodes": 3, "cycle.period_us": 500}. They are checked like a
-        file; the file is not changed.
+        file; the file is not changed. {"constants.ARBITRATION_HOLD_US": 2} changes a constant of its bus, with which
+        all answers for this profile are computed.
 
     Returns
     -------
@@ -63,6 +68,22 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     new = values_by_key(changes, name="changes")
     loaded = profile if isinstance(profile, Profile) else load(argument(profile)).profile
     return override(loaded, new)
+
+
+def with_its_constants(
+    question: Callable[_Parameters, _Answer],
+) -> Callable[_Parameters, _Answer]:
+    """Decorator of a question: it is given the loaded profile, and computes with the constants changed in that."""
+    of_loaded: Callable[..., _Answer] = question
+
+    @wraps(question)
+    def asked(profile: ProfileLike, *given: Any, **named: Any) -> _Answer:
+        with constants_changed(()):
+            loaded = load_profile(profile)
+        with constants_changed(loaded.constants):
+            return of_loaded(loaded, *given, **named)
+
+    return cast("Callable[_Parameters, _Answer]", asked)
 
 
 def load_network(profile: ProfileLike) -> Network:
@@ -287,6 +308,7 @@ def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
     shipped = load(profile.name).profile
     old, new = dotted_keys(shipped), dotted_keys(profile)
     differing = {key: place.value for key, place in new.items() if key not in old or old[key].value != place.value}
+    differing |= {f"constants.{name}": value for name, value in profile.constants}
     try:
         changes = key_changes(differing)
         return changes if changes.applied(shipped) == profile else None

@@ -175,7 +175,16 @@ def changed_report(report: Report, changes: KeyChanges) -> Report:
     return report._replace(
         blocks=(*changes_sentences(changes), *report.blocks),
         document=changed_document(report.document, changes),
+        records=_changed_records(report.records, changes),
     )
+
+
+def _changed_records(records: Sequence[Record] | None, changes: KeyChanges) -> Sequence[Record] | None:
+    """Name changed constants in rows for CSV, where no key has them."""
+    if not records or not changes.constants:
+        return records
+    constants = " ".join(f"{change.key}={change.value}" for change in changes.constants)
+    return [{**record, "changed_constants": constants} for record in records]
 
 
 def changes_sentences(changes: KeyChanges) -> list[Sentence]:

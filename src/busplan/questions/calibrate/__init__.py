@@ -19,7 +19,7 @@ from busplan.profile.document import read_bytes
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, measurements_from, parse_measurements
 from busplan.profile.sources import locate_measurements
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_network
+from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_network, with_its_constants
 from busplan.questions.fit.network import OfNetwork
 from busplan.sections.base import TransactionKind
 from busplan.sections.cycle import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
@@ -286,6 +286,7 @@ class CalibrateAnswer(OfNetwork, Answer):
         return calibration_report(self, applied_to=applied_to)
 
 
+@with_its_constants
 def calibrate(
     profile: ProfileLike,
     measurements: Measurements,

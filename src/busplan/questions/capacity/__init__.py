@@ -14,6 +14,7 @@ from busplan.questions.base.inputs import (
     load_network,
     one_or_several,
     require_cycle,
+    with_its_constants,
 )
 from busplan.questions.capacity.verdict import Verdict, verdict_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
@@ -86,6 +87,7 @@ class CapacityAnswer(Answer):
         return capacity_report(self)
 
 
+@with_its_constants
 def capacity(
     profile: ProfileLike,
     *,

@@ -10,7 +10,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole
+from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole, with_its_constants
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 
@@ -218,6 +218,7 @@ class CircleTestAnswer(Answer):
         return circle_drawing(self)
 
 
+@with_its_constants
 def circle_test(
     profile: ProfileLike,
     *,

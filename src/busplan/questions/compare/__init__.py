@@ -15,7 +15,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, require_cycle
+from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, require_cycle, with_its_constants
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
 from busplan.questions.fit.inputs import assumed_rates, given
@@ -169,6 +169,7 @@ class CompareAnswer(OfNetwork, Answer):
         return compare_report(self)
 
 
+@with_its_constants
 def compare(
     profile: ProfileLike,
     *,

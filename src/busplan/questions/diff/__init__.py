@@ -21,6 +21,7 @@ from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import OfNetwork, model_names, network_of
 from busplan.questions.plan.search import missed_limits
 from busplan.sections.profile import Profile
+from busplan.sourced import constants_changed
 
 Judgement = Literal["better", "worse", "same", "neutral"]
 
@@ -199,11 +200,12 @@ def diff(
 
 def _given(side: ProfileLike) -> tuple[str, Network]:
     """Name of one side as it was given, and its network."""
-    if isinstance(side, Profile):
-        return side.name, network_of(side)
-    if isinstance(side, str):
-        return side, network_of(load_revision(argument(side)).profile)
-    return os.fspath(side), load_network(side)
+    with constants_changed(side.constants if isinstance(side, Profile) else ()):
+        if isinstance(side, Profile):
+            return side.name, network_of(side)
+        if isinstance(side, str):
+            return side, network_of(load_revision(argument(side)).profile)
+        return os.fspath(side), load_network(side)
 
 
 def _models(timing_model: Models, a: Network, b: Network) -> tuple[str, ...]:
@@ -217,16 +219,21 @@ def _models(timing_model: Models, a: Network, b: Network) -> tuple[str, ...]:
 
 
 def _side(name: str, network: Network) -> DiffSide:
-    deciding = capacity_figures(network, model=network.bus.deciding_model)
-    return DiffSide(name, network, deciding, tuple(need.key for need in missed_limits(network)))
+    with constants_changed(network.profile.constants):
+        deciding = capacity_figures(network, model=network.bus.deciding_model)
+        return DiffSide(name, network, deciding, tuple(need.key for need in missed_limits(network)))
 
 
 def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
-    keys_a, keys_b = dotted_keys(a), dotted_keys(b)
+    keys_a, keys_b = ({**dotted_keys(side), **_constants(side)} for side in (a, b))
     for key in dict.fromkeys((*keys_a, *keys_b)):
         value_a, value_b = keys_a.get(key), keys_b.get(key)
         if value_a is None or value_b is None or value_a.value != value_b.value:
             yield KeyDifference(key, value_a, value_b)
+
+
+def _constants(profile: Profile) -> dict[str, KeyValue]:
+    return {f"constants.{name}": KeyValue(value, "file") for name, value in profile.constants}
 
 
 def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
@@ -271,7 +278,12 @@ def _figures(a: DiffSide, b: DiffSide, models: Sequence[str]) -> Iterator[Compar
         yield from _compared("deciding", cycle, a.deciding, b.deciding)
         return
     for model in models:
-        yield from _compared(model, cycle, *(capacity_figures(side.network, model=model) for side in (a, b)))
+        yield from _compared(model, cycle, *(_of_model(side.network, model) for side in (a, b)))
+
+
+def _of_model(network: Network, model: str) -> CapacityFigures:
+    with constants_changed(network.profile.constants):
+        return capacity_figures(network, model=model)
 
 
 def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:

@@ -9,7 +9,15 @@ from busplan.english import listed, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_network, one_or_several
+from busplan.questions.base.inputs import (
+    Models,
+    Periods,
+    ProfileLike,
+    checked_models,
+    load_network,
+    one_or_several,
+    with_its_constants,
+)
 from busplan.questions.explain.derivation import (
     CommandName,
     Derivation,
@@ -61,6 +69,7 @@ class ExplainAnswer(Answer):
         return f"{self.profile.name}: {plural(len(self.assumptions), 'assumption')} behind its verdict"
 
 
+@with_its_constants
 def explain(
     profile: ProfileLike,
     figure: str | None = None,

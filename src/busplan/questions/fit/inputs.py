@@ -68,7 +68,7 @@ def given(profile: Profile, key: str) -> Input:
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     common_key, group = _common_key(profile, key)
     bus_key = bus.keys.get(common_key, Key())
-    default = bus_key.default
+    default = bus.constants.get(bus_key.default)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
     by_comment = comment_grade(profile, key) if is_set and grade == "given" else None

@@ -11,6 +11,7 @@ from busplan.profile.document import override
 from busplan.sections.base import TRANSACTION_KINDS, Section, with_all_unchecked, with_unchecked
 from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
+from busplan.sourced import changed_constants
 
 PERIOD: Final = "cycle.period_us"
 
@@ -46,6 +47,8 @@ def network_of(profile: Profile) -> Network:
     profile
         The profile. Its values may be numbers, arrays or traced numbers.
     """
+    if profile.constants != changed_constants():
+        raise RuntimeError(f"{profile.name}: computed with other constants than its own; see busplan.sourced")
     cycle = profile.cycle
     groups = tuple(_group(members) for members in _runs_of_alike(profile.node_groups))
     varied = None if profile.group else ""

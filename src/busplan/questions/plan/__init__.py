@@ -22,6 +22,7 @@ from busplan.questions.base.inputs import (
     require_cycle,
     values_by_key,
     whole,
+    with_its_constants,
 )
 from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
 from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
@@ -39,6 +40,7 @@ from busplan.questions.plan.search import (
     stands_in_the_way,
 )
 from busplan.sections.profile import Profile
+from busplan.sourced import constants_changed
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,7 @@ def needed_settings(profile: Profile) -> Changes:
     return settings_to_be_carried(network_of(profile))
 
 
+@with_its_constants
 def plan(
     profile: ProfileLike,
     *,
@@ -206,10 +209,13 @@ def plan(
     }
     kept = _changes({key: from_numpy(value) for key, value in given.items() if value is not None})
     kept += changes.entries if isinstance(changes, KeyChanges) else _changes(values_by_key(changes, name="changes"))
-    if axes is not None:
-        kept = (_nodes(loaded, whole(axes, name="axes"), kept), *kept)
-    names = None if free is None else [str(name) for name in items(free, name="free")]
-    return _plan(loaded, KeyChanges(kept), names)
+    if constants := KeyChanges(kept).constants:
+        loaded, kept = KeyChanges(constants).applied(loaded), KeyChanges(kept).of_profile.entries
+    with constants_changed(loaded.constants):
+        if axes is not None:
+            kept = (_nodes(loaded, whole(axes, name="axes"), kept), *kept)
+        names = None if free is None else [str(name) for name in items(free, name="free")]
+        return _plan(loaded, KeyChanges(kept), names)
 
 
 def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> PlanAnswer:

@@ -104,7 +104,7 @@ def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
         if limit.shown.is_broken(at):
             kept_us = plain(limit.shown.shortest_period_us(at))
             if kept_us == inf:
-                way_out = f" ({limit.way_out})" if limit.way_out else ""
+                way_out = f" ({limit.advice(at)})" if limit.way_out else ""
                 yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
                 return
             least_us = max(least_us, kept_us)

@@ -41,6 +41,7 @@ from busplan.questions.latency import latency
 from busplan.questions.map import map_
 from busplan.questions.timeline import timeline
 from busplan.sections.profile import Profile
+from busplan.sourced import constants_changed
 
 
 def page_report(profiles: "Sequence[ReportedProfile]", *, title: str | None = None) -> Report:
@@ -261,7 +262,8 @@ def report(
     reported = []
     for number, ((argument, changes), profile) in enumerate(zip(named, loaded, strict=True)):
         part = None if progress is None else part_of(progress, number=number, of=len(loaded))
-        reported.append(_reported(profile, argument, changes, circle=circle, progress=part))
+        with constants_changed(profile.constants):
+            reported.append(_reported(profile, argument, changes, circle=circle, progress=part))
     return ReportAnswer(tuple(reported), title)
 
 

@@ -16,7 +16,14 @@ from busplan.forms.blocks import Code, Report, Sentence
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
+from busplan.questions.base.inputs import (
+    Models,
+    ProfileLike,
+    checked_models,
+    key_changes,
+    load_network,
+    with_its_constants,
+)
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor
 from busplan.questions.sweep.digest import first_rows, sentences
@@ -187,6 +194,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         return Report(Sentence(("Sweep of ", Code(self.profile.name))), (*self.sentences(), *rows), {})
 
 
+@with_its_constants
 def sweep(
     profile: ProfileLike,
     *,
@@ -252,7 +260,14 @@ def sweep(
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
-    checked = checked_sweep(network, vary, timing_models=models, circle=circle, unlimited=unlimited)
+    checked = checked_sweep(
+        network,
+        vary,
+        timing_models=models,
+        circle=circle,
+        unlimited=unlimited,
+        changes=key_changes({f"constants.{name}": value for name, value in network.profile.constants}),
+    )
     return computed(checked, executor=executor, progress=progress)
 
 

@@ -16,6 +16,7 @@ from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, Grid
 from busplan.sections.profile import Profile
+from busplan.sourced import constants_changed
 
 Point = dict[str, object]
 """Values by dotted key."""
@@ -91,8 +92,9 @@ def run_points(
 def _run_chunk(chunk: tuple[Profile, Sequence[Point]]) -> list[CircleFigures]:
     """Run the circle tests of some points, perhaps in another process."""
     profile, points = chunk
-    networks = (network_of(override(profile, point)) for point in points)
-    return [result for network in networks for result in run_circles(network, explain=False).results]
+    with constants_changed(profile.constants):
+        networks = (network_of(override(profile, point)) for point in points)
+        return [result for network in networks for result in run_circles(network, explain=False).results]
 
 
 def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:

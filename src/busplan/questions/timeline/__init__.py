@@ -8,7 +8,15 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, require_cycle, whole
+from busplan.questions.base.inputs import (
+    ProfileLike,
+    checked_models,
+    finite,
+    load_profile,
+    require_cycle,
+    whole,
+    with_its_constants,
+)
 from busplan.questions.fit.network import network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
 
@@ -32,6 +40,7 @@ class TimelineAnswer(Answer, Schedule):
         return timeline_report(self)
 
 
+@with_its_constants
 def timeline(
     profile: ProfileLike,
     *,
