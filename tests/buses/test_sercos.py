@@ -154,6 +154,7 @@ def test_each_period_that_is_asked_for_is_named(kind: str, run: Run, tmp_path: P
 @KINDS
 def test_a_map_has_known_periods(kind: str) -> None:
     periods = busplan.map_(f"{kind}-servo-8").y
+    assert periods is not None
     assert periods.key == "cycle.period_us"
     assert len(periods.values) > 1
     assert all(kind_named(kind).periods.allows(float(one)) for one in periods.values)

@@ -424,9 +424,10 @@ def map_command(
 ) -> None:
     """Draw where a design fits: period against axes, any two keys of the profile, or the curve of one.
 
-    With --x alone, the free time and its uncertainty are shown over that key. Each cell is the verdict of `busplan capacity` for its two values: fits, not shown to fit, does not fit, or an
+    Each cell is the verdict of `busplan capacity` for its two values: fits, not shown to fit, does not fit, or an
     unsafe gap count; with --circle also whether the circle fails. A table says what limits each region: time with its
     largest term, or a limit of the bus. The profile's own cell is marked. Values that cannot be combined are blank.
+    With --x alone, the free time and its uncertainty are drawn over that key.
     Exits 0 with any verdict.
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500

@@ -15,6 +15,14 @@ AXES, PERIOD, TIME = "axes", "cycle.period_us", "time"
 SHORTEST_US, LONGEST_US = 1e-3, 1e9
 """Ends of a period."""
 PAPER = busplan.load_profile("paper-4ms")
+
+
+def up(answer: busplan.MapAnswer) -> Any:
+    """The vertical direction of a map of two keys."""
+    assert answer.y is not None
+    return answer.y
+
+
 VALUES: dict[str, st.SearchStrategy[Any]] = {
     AXES: st.integers(0, 90),
     PERIOD: st.one_of(st.floats(1.0, 20_000.0), st.integers(0, 9)),
@@ -50,10 +58,10 @@ def is_drawn(cell: Any) -> bool:
 def assert_cells_are_those_of_capacity(answer: busplan.MapAnswer, *, step: int = 1) -> None:
     """Each cell, or one in so many."""
     columns = len(answer.x.values)
-    assert [len(row) for row in answer.rows] == [columns] * len(answer.y.values)
-    for place, (y, x) in islice(enumerate(product(answer.y.values, answer.x.values)), 0, None, step):
+    assert [len(row) for row in answer.rows] == [columns] * len(up(answer).values)
+    for place, (y, x) in islice(enumerate(product(up(answer).values, answer.x.values)), 0, None, step):
         cell: Any = answer.rows[place // columns][place % columns]
-        wanted = at(answer.profile, {answer.x.key: x, answer.y.key: y})
+        wanted = at(answer.profile, {answer.x.key: x, up(answer).key: y})
         assert (cell.x, cell.y) == (x, y)
         if wanted is None:
             assert cell in answer.not_drawn
@@ -101,12 +109,12 @@ def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
 ) -> None:
     profile = data.draw(any_profile)
     answer = busplan.map_(profile)
-    assert (answer.x.key, answer.y.key) == (AXES, PERIOD)
+    assert (answer.x.key, up(answer).key) == (AXES, PERIOD)
     assert answer.design is not None
     (nodes,) = profile.node_groups
     assert (answer.design.x, answer.design.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
-    assert max(len(answer.x.values), len(answer.y.values)) <= 24
-    assert list(answer.y.values) == sorted(set(answer.y.values))
+    assert max(len(answer.x.values), len(up(answer).values)) <= 24
+    assert list(up(answer).values) == sorted(set(up(answer).values))
     assert not answer.not_drawn
     for x in answer.x.values:
         fits = [cell.verdict == "fits" for cell in answer.cells if cell.x == x]
@@ -140,7 +148,7 @@ def test_a_strange_design_has_a_map_with_its_edge_too(changes: dict[str, object]
     answer = busplan.map_(busplan.load_profile(PAPER, changes=changes))
     assert answer.design is not None
     assert {cell.state for cell in answer.cells} == states
-    assert max(len(answer.x.values), len(answer.y.values)) <= 24
+    assert max(len(answer.x.values), len(up(answer).values)) <= 24
 
 
 def test_a_number_of_axes_that_no_nodes_have_is_not_drawn() -> None:
@@ -192,7 +200,7 @@ def test_nodes_without_axes_are_counted_themselves() -> None:
     sizes = {f"group.{name}.{kind}_bytes": 8 for name in ("drives", "tool") for kind in ("read", "write")}
     still = busplan.load_profile(GANTRY, changes={"group.drives.axes": 0, "group.tool.axes": 0, **sizes})
     answer = busplan.map_(still)
-    assert (answer.x.key, answer.y.key) == ("group.drives.nodes", PERIOD)
+    assert (answer.x.key, up(answer).key) == ("group.drives.nodes", PERIOD)
     assert answer.design is not None
     with pytest.raises(busplan.BusplanError, match="axes = 5: no whole number of nodes, with 0 axes each"):
         busplan.map_(still, x={AXES: (5,)})
@@ -220,7 +228,7 @@ def test_a_design_with_other_values_is_not_on_its_map() -> None:
     answer = busplan.map_(PAPER, x={"bus.gap_count": (7, 10)})
     assert (answer.design, answer.design_place) == (None, None)
     beside = busplan.map_(PAPER, x={"bus.gap_count": (7, 63)})
-    assert beside.design_place == (beside.y.values.index(4000), 1)
+    assert beside.design_place == (up(beside).values.index(4000), 1)
 
 
 @pytest.mark.parametrize(
@@ -308,18 +316,18 @@ def test_one_key_gives_the_curve_of_the_free_time() -> None:
     assert (document["y"], [cell["cycle.period_us"] for cell in document["cells"]]) == (None, [500, 1000, 2000])
     lines = str(answer).splitlines()
     assert [line.split("  ")[0] for line in lines[-3:]] == ["500 us", "1 ms", "2 ms"]
-    (panel,) = answer.drawing().panels
-    curve = panel.plot.curves[0]
+    plot: Any = answer.drawing().panels[0].plot
+    curve = plot.curves[0]
     assert curve.points == tuple(
         zip((500.0, 1000.0, 2000.0), (cell.margin_corrected_us for cell in answer.cells), strict=True)
     )
-    assert [(shade.entry.words, shade.low, shade.high) for shade in panel.plot.shades] == [("does not fit", 500, 750)]
+    assert [(shade.entry.words, shade.low, shade.high) for shade in plot.shades] == [("does not fit", 500, 750)]
 
 
 def test_words_of_one_key_are_points_without_a_line() -> None:
-    (panel,) = busplan.map_("paper-4ms", x={"bus.gap_count": [63, "optimal"]}).drawing().panels
-    assert [tick.label for tick in panel.plot.across.ticks] == ["63", "optimal"]
-    assert not any(curve.has_line for curve in panel.plot.curves)
+    plot: Any = busplan.map_("paper-4ms", x={"bus.gap_count": [63, "optimal"]}).drawing().panels[0].plot
+    assert [tick.label for tick in plot.across.ticks] == ["63", "optimal"]
+    assert not any(curve.has_line for curve in plot.curves)
 
 
 def test_one_key_of_messages_alone_has_verdicts(tmp_path: Path) -> None:
