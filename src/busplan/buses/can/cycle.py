@@ -67,6 +67,7 @@ NONE: Final[TimingModelName] = "no-stuffing"
 
 _DAVIS: Final = BUS_LOAD.reference
 EVENTS: Final = (
+    EventKind("jitter", "SYNC's jitter", "profile", "j", "contention"),
     EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
     EventKind("wait", "wait for nodes", "profile", "=", "work"),
     EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "in"),
@@ -86,7 +87,7 @@ STRETCHES: Final = (
 
 
 class CanCycle(BusCycle):
-    """SYNC, the wait for the slowest node, all feedback PDOs, the host, all command PDOs, and the window.
+    """SYNC's jitter, SYNC, the wait for the slowest node, all feedback PDOs, the host, all command PDOs, and the window.
 
     A network of messages alone has no cycle: then no term takes time, and only loads and response times are there.
 
@@ -251,6 +252,8 @@ class CanCycle(BusCycle):
         *before, commands = self._parts
         blocking_us, counts = self._waits
         blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
+        jitter_us, late = self.traffic.sync_jitter_us, "latest start of SYNC"
+        yield BusEvent("jitter", "cycle_jitter_us", jitter_us, late, rests_on="bus.sync_jitter_us")
         if self.traffic.has_sync:
             opening, feedback = before
             yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
@@ -541,10 +544,10 @@ class CanCycle(BusCycle):
         )
 
     def _loop(self) -> dict[str, Number]:
-        """Parts of the way from SYNC to the last executed command that rests on it."""
+        """Parts of the way from the instant of SYNC to the last executed command that rests on it."""
         us = self.by_term
         parts_us = {
-            "jitter_us": 0.0,
+            "jitter_us": us["cycle_jitter_us"],
             "blocking_us": us["cycle_blocking_us"],
             "interference_us": us["cycle_interference_us"],
             "backlog_us": 0.0,
@@ -574,7 +577,7 @@ class CanCycle(BusCycle):
         return cycles if self.traffic.has_sync else larger(cycles, 1)
 
     def sync_jitter_us(self) -> Number:
-        """Half of what messages may hold SYNC up; infinite where that has no end, 0 where no SYNC is sent [us]."""
+        """Half of SYNC's jitter and of what may hold it up; infinite without an end, 0 where no SYNC is sent [us]."""
 
         def held_up_us(traffic: Traffic) -> Number:
             worst = sync_response(traffic)
@@ -582,7 +585,8 @@ class CanCycle(BusCycle):
 
         if not self.traffic.has_sync:
             return 0.0
-        return self.traffic.ask(held_up_us, words="frames before SYNC, B + I") / 2
+        held_us = self.traffic.ask(held_up_us, words="frames before SYNC, B + I")
+        return (self.traffic.sync_jitter_us + held_us) / 2
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message; of no arrays."""

@@ -132,6 +132,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.host_us": Key("host"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
         "bus.clock_tolerance": Key("df"),
+        "bus.sync_jitter_us": Key("J_SYNC"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default=SYNC_IDENTIFIER),
@@ -145,7 +146,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "message.deadline_us": Key("D"),
         "message.identifier": Key("id"),
     }
-    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
+    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0}, {"bus.sync_jitter_us": 0.0})
     modules = ("evidence", "emulated")
     recordings = "a log of candump, ASC, BLF or TRC, or a capture of SocketCAN,"
     evidence_data = ("can", "paper")
