@@ -1,7 +1,7 @@
 """The cycle, of SYNC or of requests and answers, with the waits for other messages."""
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, partial, reduce
 from itertools import chain
@@ -58,7 +58,7 @@ from busplan.elementwise import (
     within,
 )
 from busplan.english import first_of
-from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
@@ -492,7 +492,7 @@ class CanCycle(BusCycle):
             return choose(left >= 0, 0.0, inf)
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
-    def card_lines(self) -> tuple[tuple[str, str], ...]:
+    def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:
         """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
         most = self.network.profile.most_load
         words = f"{_short(100 * plain(self.load))} %" + (f", {_short(100 * most)} allowed" if most < 1 else "")
@@ -510,12 +510,24 @@ class CanCycle(BusCycle):
         if possible_us:
             why = "its frames may hide this" if self.traffic.access == "burst" else "the test of queues is sufficient"
             lines.append(("upper bound", f"up to {_short(possible_us)} us less may do: {why}"))
-        most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
+        most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: not fits(self._with_burst(number))) - 1
         if most >= 0:
-            kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"
-            broken = f" makes {self._late_with(most + 1)} late" if most < MOST_REPEATED else " was not tried"
-            lines.append((REPEATED, kept + broken))
+            kept = f"up to {most} in a row keep the verdict, one more" if most else "a single one"
+            lines.append((REPEATED, kept + (self._broken_with(most + 1) if most < MOST_REPEATED else " was not tried")))
         return tuple(lines)
+
+    def _with_burst(self, repeated: int) -> Network:
+        """The network with some repeated frames in a row; 0 without errors."""
+        profile = self.network.profile
+        period_us = (profile.bus.error_period_us or MAX_TIME_US) if repeated else None
+        errors = {"error_burst": repeated or None, "error_period_us": period_us}
+        bus = profile.bus.model_copy(update=errors)
+        return self.network._replace(profile=profile.model_copy(update={"bus": bus}))
+
+    def _broken_with(self, repeated: int) -> str:
+        """What some repeated frames in a row break, in words."""
+        late = self._late_with(repeated)
+        return f" makes {late} late" if late else " is not shown to fit"
 
     def _late_with(self, repeated: int) -> str:
         """What is late, or not shown to be in time, with some repeated frames in a row; empty where nothing is."""
