@@ -437,7 +437,9 @@ def moments(own: Scene, random: Random) -> Moments:
         queued_us=tuple(queued for _, queued in each),
         late_us=random.choice([0, 1]),
         errors_us=_errors(own, random),
-        sync_late_us=tuple(some(own.traffic.sync_jitter_us) for _ in range(CYCLES)) if own.traffic.sync_jitter_us else (),
+        sync_late_us=tuple(some(own.traffic.sync_jitter_us) for _ in range(CYCLES))
+        if own.traffic.sync_jitter_us
+        else (),
     )
 
 
@@ -495,7 +497,9 @@ def varied(own: Scene, at: Moments, last: Run, random: Random) -> Moments:
         due_us, queued_us = fresh.due_us[place], fresh.queued_us[place]
     else:
         place_of = random.randrange(CYCLES)
-        verge_us = random.choice([0, *at.sync_late_us[place_of : place_of + 1], max(last.feedback_us[place_of]), last.commands_us[place_of]])
+        verge_us = random.choice(
+            [0, *at.sync_late_us[place_of : place_of + 1], max(last.feedback_us[place_of]), last.commands_us[place_of]]
+        )
         verge_us += place_of * own.period_us + random.choice([-1, -1, 0, 1, random.randint(-300, 50)])
         shift_us = verge_us - random.choice(queued_us)
         moved = [(due + shift_us, queued + shift_us) for due, queued in zip(due_us, queued_us, strict=True)]
