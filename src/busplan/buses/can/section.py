@@ -390,7 +390,7 @@ class CanProfile(Profile):
             keys.append("bus.pipeline_cycles")
         none = f'and bus.access = "{bus.access}" has none'
         words = {
-            "pipeline_cycles": "asks for SYNC: without it a command rests on answers of an earlier cycle; write 1 or more",
+            "pipeline_cycles": "asks for SYNC: without it a command rests on an earlier cycle; write 1 or more",
             "queue": f"is computed with SYNC alone, {none}; remove it, and by priority is assumed",
             "update": f"asks for SYNC, {none}; say on_arrival",
         }
