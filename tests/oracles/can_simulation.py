@@ -2,7 +2,8 @@
 
 Every sender queues its frames; whenever the bus is free, the queued frame with the smallest identifier goes, and
 nothing interrupts it. A sender whose queue is not by priority offers one of its frames at a time: the first that came,
-or any of them. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind
+or any of them. The host queues SYNC at the start of each cycle, or so
+much later as the caller says. A node queues its feedback some time behind
 SYNC, the host queues all commands some time behind the last feedback, and a node executes its command some time behind
 its last frame. Other messages are queued whenever the caller says. An error breaks the frame that is on the bus, which
 stays queued, and holds the bus for a while. Times are whole numbers of any unit.
@@ -79,6 +80,7 @@ def simulate(
     period_us: int,
     host_us: Sequence[int],
     late_us: int = 0,
+    sync_late_us: Sequence[int] = (),
     errors_us: Sequence[int] = (),
     error_us: int = 0,
     orders: Mapping[Hashable, Random | None] = _BY_PRIORITY,
@@ -97,12 +99,14 @@ def simulate(
         From the last feedback to the queued commands, cycle by cycle.
     late_us
         A frame that is queued so long behind the start of another still takes part in its arbitration.
+    sync_late_us
+        How late SYNC is queued, cycle by cycle; without it never.
     errors_us, error_us
         Instants of errors, ascending, and how long each holds the bus. Those without a frame on the bus do nothing.
     orders
         Senders whose queue is not by priority: None where it is first in, first out, else what draws any of it.
     """
-    bus = _Bus(sync, nodes, messages, period_us, host_us)
+    bus = _Bus(sync, nodes, messages, period_us, host_us, sync_late_us or (0,) * len(host_us))
     bus.orders = orders
     bus.run(late_us, errors_us, error_us)
     return Run(
@@ -128,6 +132,7 @@ class _Bus:
         messages: Sequence[SimulatedMessage],
         period_us: int,
         host_us: Sequence[int],
+        sync_late_us: Sequence[int],
     ) -> None:
         self.nodes, self.messages, self.period_us, self.host_us = nodes, messages, period_us, host_us
         cycles = len(host_us)
@@ -145,7 +150,7 @@ class _Bus:
         self.waiting: dict[Hashable, list[tuple[int, int, tuple[int, ...]]]] = {}
         """Frames of a queue that is not by priority, beside the one that it offers."""
         for cycle in range(cycles):
-            self.put(cycle * period_us, sync, SYNC, cycle)
+            self.put(cycle * period_us + sync_late_us[cycle], sync, SYNC, cycle)
         for number, message in enumerate(messages):
             for instance, when_us in enumerate(message.queued_us):
                 self.put(when_us, message.frame, MESSAGE, number, instance)

@@ -317,8 +317,14 @@ class BusCycle(ABC):
         """Figures of this kind other than the terms, by key; None for a figure that these groups do not have."""
         return {}
 
-    def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """Lines of this kind in the summary card of `capacity`: labels and words; of plain numbers."""
+    def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002 - not of all
+        """Lines of this kind in the summary card of `capacity`: labels and words; of plain numbers.
+
+        Parameters
+        ----------
+        fits
+            Whether a network is shown to fit, for lines that say how much more still does.
+        """
         return ()
 
     def latencies(self) -> tuple[BusLatency, ...]:

@@ -46,6 +46,7 @@ def test_its_cycle_is_that_by_hand() -> None:
     others = 55 * BIT_US + (50 + 46) + 3 * (pdo_in + pdo_out)
     assert others == 2156  # within 2000 us less the jitter two alarms arrive, and go before all PDOs
     assert terms(profile()) == {
+        "jitter": 0,
         "sync": 110,
         "wait": 96,
         "feedback": 3 * pdo_in,

@@ -84,7 +84,7 @@ def test_errors_are_what_it_rests_on_then(run: Run, plan_file: Path) -> None:
 def test_the_margin_is_said_in_repeated_frames(run: Run, plan_file: Path) -> None:
     said = run("capacity", plan_file.name, cwd=plan_file.parent).stdout
     (margin,) = re.findall(
-        r"repeated frames +up to (\d+) in a row keep every deadline, one more makes ([\w ]+) late", said
+        r"repeated frames +up to (\d+) in a row keep the verdict, one more makes ([\w ]+) late", said
     )
     most, late = int(margin[0]), margin[1]
     assert late == ("door" if "door" in plan_file.read_text("utf-8") else "the cycle")
@@ -201,4 +201,4 @@ def test_so_does_the_margin_in_repeated_frames(share: float, kept: int) -> None:
     changes = {"bus.clock_tolerance": share, "message.sdo-response.deadline_us": 5000}
     (card,) = busplan.capacity(busplan.load_profile("can-servo-8", changes=changes)).to_dict()["verdicts"]
     (words,) = (line["text"] for line in card["lines"] if line["label"] == "repeated frames")
-    assert words == f"up to {kept} in a row keep every deadline, one more makes sdo-response late"
+    assert words == f"up to {kept} in a row keep the verdict, one more makes sdo-response late"

@@ -79,6 +79,7 @@ class Traffic(NamedTuple):
     """Of SYNC and PDOs as frames of CAN FD; 0 of classical ones."""
     errors: tuple[int, int] = (0, 0)
     """Mean time from one error to the next, and how many come at once; 0 without errors."""
+    sync_jitter_us: int = 0
     orders: tuple[tuple[str, str], ...] = ()
     """Senders whose queues are not by priority, each with its order; others have queues by priority."""
 
@@ -167,6 +168,7 @@ class Traffic(NamedTuple):
         """A profile of it."""
         bus = {"kind": "can", "bit_rate_kbit_s": self.bit_rate, "sync_identifier": self.sync_identifier}
         bus |= {"sync_counter": bool(self.sync_bytes), "host_us": self.host_us}
+        bus["sync_jitter_us"] = self.sync_jitter_us
         if self.data_bit_rate:
             bus["data_bit_rate_kbit_s"] = self.data_bit_rate
         if self.errors[0]:
@@ -242,6 +244,7 @@ class Moments(NamedTuple):
     """Of each message, within its jitter."""
     late_us: int
     errors_us: Whole = ()
+    sync_late_us: Whole = ()
 
 
 def traffic(random: Random, *, nodes: int) -> Traffic:
@@ -328,6 +331,12 @@ def of_errors(sent: Traffic, random: Random) -> Traffic:
     return (kind(sent, random) if kind else sent)._replace(errors=(period_us, random.choice([1, 1, 2, 3])))
 
 
+def of_late_syncs(sent: Traffic, random: Random) -> Traffic:
+    """Traffic of any sort whose host sends SYNC late."""
+    kind = random.choice([of_both_formats, of_fd, of_rates, of_bursts, of_errors, of_queues, None, None])
+    return (kind(sent, random) if kind else sent)._replace(sync_jitter_us=random.choice([1, 50, 200, 400, 900]))
+
+
 def of_queues(sent: Traffic, random: Random) -> Traffic:
     """Traffic of any sort whose senders have queues first in, first out, or single buffers."""
     kind = random.choice([of_both_formats, of_fd, of_rates, of_bursts, of_errors, None, None])
@@ -348,6 +357,7 @@ KINDS: Final = {
     "bursts": of_bursts,
     "errors": of_errors,
     "queues": of_queues,
+    "late SYNCs": of_late_syncs,
 }
 """What may become of random traffic of 11 bits."""
 
@@ -406,6 +416,7 @@ def run(own: Scene, at: Moments) -> Run:
         period_us=own.period_us,
         host_us=at.host_us,
         late_us=at.late_us,
+        sync_late_us=at.sync_late_us,
         errors_us=at.errors_us,
         error_us=ERROR_BITS * 1000 // sent.bit_rate,
         orders=sent.drawn(at.late_us),
@@ -426,6 +437,9 @@ def moments(own: Scene, random: Random) -> Moments:
         queued_us=tuple(queued for _, queued in each),
         late_us=random.choice([0, 1]),
         errors_us=_errors(own, random),
+        sync_late_us=tuple(some(own.traffic.sync_jitter_us) for _ in range(CYCLES))
+        if own.traffic.sync_jitter_us
+        else (),
     )
 
 
@@ -470,6 +484,8 @@ def varied(own: Scene, at: Moments, last: Run, random: Random) -> Moments:
         # Errors move all frames behind them, so the first of them stays more often than not.
         first_us = random.choice([*at.errors_us[:1] * 10, *(us - 1 for us in last.ends_us[:20])])
         return at._replace(errors_us=_errors(own, random, first_us, last))
+    if own.traffic.sync_jitter_us and random.random() < 0.2:
+        return at._replace(sync_late_us=fresh.sync_late_us)
     if what == 0:
         place = random.randrange(own.traffic.nodes)
         return at._replace(reads_us=_with(at.reads_us, place, fresh.reads_us[place]))
@@ -481,7 +497,9 @@ def varied(own: Scene, at: Moments, last: Run, random: Random) -> Moments:
         due_us, queued_us = fresh.due_us[place], fresh.queued_us[place]
     else:
         place_of = random.randrange(CYCLES)
-        verge_us = random.choice([0, max(last.feedback_us[place_of]), last.commands_us[place_of]])
+        verge_us = random.choice(
+            [0, *at.sync_late_us[place_of : place_of + 1], max(last.feedback_us[place_of]), last.commands_us[place_of]]
+        )
         verge_us += place_of * own.period_us + random.choice([-1, -1, 0, 1, random.randint(-300, 50)])
         shift_us = verge_us - random.choice(queued_us)
         moved = [(due + shift_us, queued + shift_us) for due, queued in zip(due_us, queued_us, strict=True)]

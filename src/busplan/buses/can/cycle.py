@@ -1,7 +1,7 @@
 """The cycle, of SYNC or of requests and answers, with the waits for other messages."""
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, partial, reduce
 from itertools import chain
@@ -58,7 +58,7 @@ from busplan.elementwise import (
     within,
 )
 from busplan.english import first_of
-from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
@@ -67,6 +67,7 @@ NONE: Final[TimingModelName] = "no-stuffing"
 
 _DAVIS: Final = BUS_LOAD.reference
 EVENTS: Final = (
+    EventKind("jitter", "SYNC's jitter", "profile", "j", "contention"),
     EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
     EventKind("wait", "wait for nodes", "profile", "=", "work"),
     EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "in"),
@@ -86,7 +87,7 @@ STRETCHES: Final = (
 
 
 class CanCycle(BusCycle):
-    """SYNC, the wait for the slowest node, all feedback PDOs, the host, all command PDOs, and the window.
+    """SYNC's jitter, SYNC, the wait for the slowest node, feedback PDOs, the host, command PDOs, and the window.
 
     A network of messages alone has no cycle: then no term takes time, and only loads and response times are there.
 
@@ -251,6 +252,8 @@ class CanCycle(BusCycle):
         *before, commands = self._parts
         blocking_us, counts = self._waits
         blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
+        jitter_us, late = self.traffic.sync_jitter_us, "latest start of SYNC"
+        yield BusEvent("jitter", "cycle_jitter_us", jitter_us, late, rests_on="bus.sync_jitter_us")
         if self.traffic.has_sync:
             opening, feedback = before
             yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
@@ -489,7 +492,7 @@ class CanCycle(BusCycle):
             return choose(left >= 0, 0.0, inf)
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
-    def card_lines(self) -> tuple[tuple[str, str], ...]:
+    def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:
         """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
         most = self.network.profile.most_load
         words = f"{_short(100 * plain(self.load))} %" + (f", {_short(100 * most)} allowed" if most < 1 else "")
@@ -507,12 +510,26 @@ class CanCycle(BusCycle):
         if possible_us:
             why = "its frames may hide this" if self.traffic.access == "burst" else "the test of queues is sufficient"
             lines.append(("upper bound", f"up to {_short(possible_us)} us less may do: {why}"))
-        most = bisect_left(range(int(c.MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
+        tried = range(int(c.MOST_REPEATED) + 1)
+        most = bisect_left(tried, 1, key=lambda number: not fits(self._with_burst(number))) - 1
         if most >= 0:
-            kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"
-            broken = f" makes {self._late_with(most + 1)} late" if most < c.MOST_REPEATED else " was not tried"
+            kept = f"up to {most} in a row keep the verdict, one more" if most else "a single one"
+            broken = self._broken_with(most + 1) if most < c.MOST_REPEATED else " was not tried"
             lines.append((REPEATED, kept + broken))
         return tuple(lines)
+
+    def _with_burst(self, repeated: int) -> Network:
+        """The network with some repeated frames in a row; 0 without errors."""
+        profile = self.network.profile
+        period_us = (profile.bus.error_period_us or MAX_TIME_US) if repeated else None
+        errors = {"error_burst": repeated or None, "error_period_us": period_us}
+        bus = profile.bus.model_copy(update=errors)
+        return self.network._replace(profile=profile.model_copy(update={"bus": bus}))
+
+    def _broken_with(self, repeated: int) -> str:
+        """What some repeated frames in a row break, in words."""
+        late = self._late_with(repeated)
+        return f" makes {late} late" if late else " is not shown to fit"
 
     def _late_with(self, repeated: int) -> str:
         """What is late, or not shown to be in time, with some repeated frames in a row; empty where nothing is."""
@@ -541,10 +558,10 @@ class CanCycle(BusCycle):
         )
 
     def _loop(self) -> dict[str, Number]:
-        """Parts of the way from SYNC to the last executed command that rests on it."""
+        """Parts of the way from the instant of SYNC to the last executed command that rests on it."""
         us = self.by_term
         parts_us = {
-            "jitter_us": 0.0,
+            "jitter_us": us["cycle_jitter_us"],
             "blocking_us": us["cycle_blocking_us"],
             "interference_us": us["cycle_interference_us"],
             "backlog_us": 0.0,
@@ -574,7 +591,7 @@ class CanCycle(BusCycle):
         return cycles if self.traffic.has_sync else larger(cycles, 1)
 
     def sync_jitter_us(self) -> Number:
-        """Half of what messages may hold SYNC up; infinite where that has no end, 0 where no SYNC is sent [us]."""
+        """Half of SYNC's jitter and of what may hold it up; infinite without an end, 0 where no SYNC is sent [us]."""
 
         def held_up_us(traffic: Traffic) -> Number:
             worst = sync_response(traffic)
@@ -582,7 +599,8 @@ class CanCycle(BusCycle):
 
         if not self.traffic.has_sync:
             return 0.0
-        return self.traffic.ask(held_up_us, words="frames before SYNC, B + I") / 2
+        held_us = self.traffic.ask(held_up_us, words="frames before SYNC, B + I")
+        return (self.traffic.sync_jitter_us + held_us) / 2
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message; of no arrays."""

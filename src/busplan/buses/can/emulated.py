@@ -50,8 +50,8 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     """Emulate the log of a machine that keeps its plan, but for the faults.
 
     Nodes queue their feedback T_exec behind SYNC, and up to the slowest extra time later; the host queues all commands
-    behind the last feedback and half to all of its time. Messages come each by its period and evenly within its jitter,
-    a burst at once. Data are random. Stamps count from 0.
+    behind the last feedback and half to all of its time. SYNC comes evenly within its jitter. Messages come each by its
+    period and evenly within its jitter, a burst at once. Data are random. Stamps count from 0.
 
     Parameters
     ----------
@@ -128,12 +128,15 @@ class _Machine:
 
     def _alone(self) -> Iterator[_Queued]:
         """SYNCs and messages, which wait for no other frame."""
-        late_us = self.emulation.faults.get(JITTER.name, 0.0)
+        late_us, own_us = self.emulation.faults.get(JITTER.name, 0.0), plain(self.traffic.sync_jitter_us)
         for sender in self.senders:
             stream = sender.stream
             if stream.name == SYNC:
                 for cycle in sorted(set(range(self.emulation.cycles)) - self.hit[MISSING]):
-                    yield self._at(cycle * self.period_us + late_us * (cycle in self.hit[JITTER]), sender, cycle)
+                    queued_us = cycle * self.period_us + late_us * (cycle in self.hit[JITTER])
+                    if own_us:
+                        queued_us += self.random.uniform(0, own_us)
+                    yield self._at(queued_us, sender, cycle)
             if stream.is_message:
                 due_us = self.random.uniform(0, stream.period_us * stream.burst)
                 while due_us < self.end_us:

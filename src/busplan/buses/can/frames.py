@@ -94,6 +94,8 @@ class Traffic:
     """The slowest execution of any node, from SYNC to its queued feedback [us]."""
     host_us: Number = 0.0
     """From the last feedback to the queued commands [us]."""
+    sync_jitter_us: Number = 0.0
+    """How late SYNC may be queued [us]."""
     error_period_us: Number = MAX_TIME_US
     """From one error on the wire to the next; of bursts the mean time [us]."""
     error_burst: Number = 0
@@ -280,6 +282,8 @@ def _traffic(network: Network) -> Traffic:
         traffic,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
+        # A punctual SYNC is no input of a derivation.
+        sync_jitter_us=_unless(bus.sync_jitter_us, 0),
         read_us=reduce(larger, (group.read_execution_us + group.worst_extra_us for group in groups)),
         # Where the host computes in a cycle of its own, it takes no time of this one.
         host_us=choose(bus.pipeline_cycles > 0, 0.0, bus.host_us),
@@ -550,7 +554,7 @@ def _cyclic(traffic: Traffic) -> Iterator[Stream]:
         data_bytes=size,
         frame_us=traffic.frame_us(size, traffic),
         period_us=traffic.period_us,
-        jitter_us=0.0,
+        jitter_us=traffic.sync_jitter_us,
         deadline_us=traffic.period_us,
         identifier_bits=traffic.identifier_bits,
     )

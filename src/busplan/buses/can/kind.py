@@ -129,6 +129,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.host_us": Key("host"),
         "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
         "bus.clock_tolerance": Key("df"),
+        "bus.sync_jitter_us": Key("J_SYNC"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default="SYNC_IDENTIFIER"),
@@ -142,7 +143,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "message.deadline_us": Key("D"),
         "message.identifier": Key("id"),
     }
-    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
+    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0}, {"bus.sync_jitter_us": 0.0})
     modules = ("evidence", "emulated")
     recordings = "a log of candump, ASC, BLF or TRC, or a capture of SocketCAN,"
     evidence_data = ("can", "paper")
@@ -179,14 +180,16 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A slower host, SYNC with its counter, and identifiers of 29 bits; of a network with a cycle."""
+        """A slower host, SYNC later or with its counter, and identifiers of 29 bits; of a network with a cycle."""
         bus, is_sync = network.profile.bus, network.profile.bus.access == "sync"
         counted = "SYNC has its counter already" if bus.sync_counter else "" if is_sync else "there is no SYNC"
         extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
         elsewhere = "the host computes in cycles of its own" if is_sync and bus.pipeline_cycles else ""
         slower = {"bus.host_us": bus.host_us + _HOST_STEP_US}
+        later = {"bus.sync_jitter_us": bus.sync_jitter_us + _HOST_STEP_US}
         return (
             Perturbation(f"host +{_HOST_STEP_US:g} us", slower, elsewhere),
+            Perturbation(f"SYNC's jitter +{_HOST_STEP_US:g} us", later, "" if is_sync else "there is no SYNC"),
             Perturbation("SYNC with counter", {"bus.sync_counter": True}, counted),
             Perturbation("identifiers of 29 bits", {"bus.identifier_bits": 29}, extended),
         )

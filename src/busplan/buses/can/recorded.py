@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import ceil, isfinite
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -321,7 +321,12 @@ class _Log:
             yield RecordedFigure(
                 "last PDO after SYNC",
                 "us",
-                _finite(plain(self.cycle.required_us) - plain(self.network.nonperiodic_us)),
+                # From a SYNC as it came, late or not.
+                _finite(
+                    plain(self.cycle.required_us)
+                    - plain(self.network.nonperiodic_us)
+                    - plain(self.traffic.sync_jitter_us)
+                ),
                 behind.value,
                 self._with_stamps(*(plain(doubt.us) for doubt in self.cycle.doubts()), behind.uncertainty or 0.0),
                 "at most",
@@ -382,7 +387,12 @@ class _Log:
             late = lateness(periods, self.share)
             doubt_us = self._with_stamps(late.uncertainty or 0.0)
             quantity = "SYNC: jitter of the arrival"
-            yield RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count)
+            key = "bus.sync_jitter_us"
+            jitter = RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count, key)
+            yield jitter
+            if jitter.verdict == "outside":
+                # All of it may be the host's: what other frames add is not known of any one SYNC.
+                self.edits[key] = ceil(10 * late.value) / 10
 
     def _message(
         self, stream: Stream, label: str, recorded: Sequence[SentFrames], spread_us: float | None

@@ -83,10 +83,15 @@ class CanBus(BusSection):
     sync_counter: bool = Field(
         default=False, description="Whether SYNC carries its counter, one byte (CiA 301)", examples=[True]
     )
+    sync_jitter_us: TimeUs = Field(
+        default=0.0,
+        description="How late the host may send SYNC, under the period: the cycle ends so much sooner [us]",
+        examples=[50],
+    )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle; "
-        "without SYNC at least 1. For latency, and a loop on the host",
+        "without SYNC 1 or more, by default 1. For latency, and a loop on the host",
         examples=[1],
     )
     host_us: TimeUs = Field(
@@ -284,6 +289,7 @@ _OF_CYCLE: Final = {
         "access",
         "sync_identifier",
         "sync_counter",
+        "sync_jitter_us",
         "pipeline_cycles",
         "host_us",
         "host_grade",
@@ -292,6 +298,8 @@ _OF_CYCLE: Final = {
     "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
 }
 """Keys of sections that only a network with a cycle has."""
+_OF_SYNC: Final = ("sync_identifier", "sync_counter", "sync_jitter_us")
+"""Keys of section [bus] that only a cycle with SYNC has."""
 _PDO_NAMES: Final = tuple(NAMES.values())
 
 
@@ -342,6 +350,9 @@ class CanProfile(Profile):
             yield from self._problems_of_no_cycle()
         if self.bus.access != "sync":
             yield from self._problems_of_no_sync()
+        elif self.bus.sync_jitter_us >= self.cycle.period_us:
+            why = f"is not under cycle.period_us, {self.cycle.period_us:g}: the next SYNC would come before it"
+            yield Problem(why, key="bus.sync_jitter_us", kind="inconsistent")
         yield from self._names_problems()
         yield from self._identifiers_problems()
         if self.bus.data_bit_rate_kbit_s is None:
@@ -363,14 +374,17 @@ class CanProfile(Profile):
     def _problems_of_no_sync(self) -> Iterator[Problem]:
         """Keys that only a cycle with SYNC has, and nodes without a command or an answer."""
         bus, names = self.bus, dict(self._payloads())
-        keys = [f"bus.{name}" for name in ("sync_identifier", "sync_counter") if name in bus.model_fields_set]
+        keys = [f"bus.{name}" for name in _OF_SYNC if name in bus.model_fields_set]
         keys += (f"{section}.every" for section, payload in names.items() if payload.every > 1)
         sections = {**({} if self.node is None else {"node": self.node}), "bus": bus, **names}
         keys += (f"{name}.queue" for name, part in sections.items() if getattr(part, "queue", None) in NOT_BY_PRIORITY)
         if (self.servo.loop, self.servo.update) == ("host", "next_sync"):
             keys.append("servo.update")
+        if "pipeline_cycles" in bus.model_fields_set and not bus.pipeline_cycles:
+            keys.append("bus.pipeline_cycles")
         none = f'and bus.access = "{bus.access}" has none'
         words = {
+            "pipeline_cycles": "asks for SYNC: without it a command rests on an earlier cycle; write 1 or more",
             "queue": f"is computed with SYNC alone, {none}; remove it, and by priority is assumed",
             "update": f"asks for SYNC, {none}; say on_arrival",
         }

@@ -78,8 +78,8 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     the last PDO go whenever they are queued: b - 1 + ceil((w + J + bit) / T). So do errors: each takes the time of the
     longest frame of all, of those that block, too.
 
-    Nothing of that is still pending from the cycle before: all that was queued by w behind its start has been sent by
-    then, and w is within the period.
+    Nothing of that is still pending from the cycle before: all that was queued by w behind its SYNC has been sent by
+    then, and w is within the period less the jitter of SYNC, the least time to the next one.
 
     In a queue that is not by priority SYNC or a PDO may be behind each message of its sender. So frames go before it
     up to the last identifier of the queue.
@@ -361,19 +361,20 @@ class _Start(NamedTuple):
         """Latest queueing of a stream; negative where the first comes so much behind the start [us]."""
         if stream.is_message or not self.late:
             return stream.jitter_us
-        # Late ones come again with their own period. Of the others any may be due in the next cycle.
+        # Late ones come again with their own period. Of the others any may be due in the next cycle. Where the first
+        # SYNC was late and the others are not, all come sooner by its jitter.
         again_us = stream.period_us if stream.name in self.late else self.period_us
-        return smaller(self.late_us - again_us, 0.0)
+        return smaller(self.late_us + stream.jitter_us - again_us, 0.0)
 
 
 def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
     """Where a busy period of a message may begin: it has the worst of these.
 
-    SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
-    once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
-    that follows it sooner than a period later. Behind messages of their queue, and without SYNC, these may be as late
-    as the end of the cycle; SYNC behind such messages begins no other busy period, for all that is before it then is
-    sent in this cycle.
+    SYNC comes once a period, sooner by its jitter, and feedback and commands behind it. So a busy period that begins
+    with SYNC meets each once a period. One that begins with late feedback, or with late commands, meets these, and the
+    next SYNC with all that follows it sooner than a period later. Behind messages of their queue, and without SYNC,
+    these may be as late as the end of the cycle; SYNC behind such messages begins no other busy period, for all that is
+    before it then is sent in this cycle.
     """
     if not traffic.has_cycle:
         return [_Start()]

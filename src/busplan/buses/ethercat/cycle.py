@@ -1,6 +1,6 @@
 """The cycle: the master, all frames in sequence, their path through devices and back, and the non-periodic window."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, reduce
 from typing import Final, Literal
 
@@ -227,7 +227,7 @@ class EthercatCycle(BusCycle):
             MEAN.key: self._mean_us / self._given_us,
         }
 
-    def card_lines(self) -> tuple[tuple[str, str], ...]:
+    def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002 - its margin is said elsewhere
         """For groups with rates of their own: the cycle of the verdict, and the mean cycle."""
         if not has_rates(self.network):
             return ()

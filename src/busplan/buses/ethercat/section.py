@@ -136,8 +136,8 @@ class EthercatNode(NodeSection):
     )
     sync_window_us: Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)] | None = Field(
         default=None,
-        description="How far a frame may move against SYNC0 from cycle to cycle before the device reports an error; "
-        "used only with distributed clocks [us]",
+        description="How far a frame may move against SYNC0 from cycle to cycle before the device reports an error, up "
+        "to the period; used only with distributed clocks [us]",
         examples=[50],
     )
 
@@ -197,6 +197,12 @@ class EthercatProfile(Profile):
     )
 
     def _problems(self) -> Iterator[Problem]:
+        sections = {"node": self.node, **{f"group.{place}": group for place, group in enumerate(self.group)}}
+        for section, nodes in sections.items():
+            window_us = None if nodes is None else nodes.sync_window_us
+            if window_us is not None and window_us > self.cycle.period_us:
+                why = f"is over cycle.period_us, {self.cycle.period_us:g}: a window about SYNC0 is within a period"
+                yield Problem(why, key=f"{section}.sync_window_us", kind="inconsistent")
         try:
             checked_hyperperiod([group.every for group in self.group])
         except BusplanError as error:

@@ -15,7 +15,7 @@ from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Wor
 from busplan.forms.numbers import period
 from busplan.profile.edit import short_text
 from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
@@ -141,7 +141,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         assumptions=heavy_assumptions(deciding, network),
         left_out=cycle.left_out(),
         premises=cycle.premises(),
-        bus_lines=cycle.card_lines(),
+        bus_lines=cycle.card_lines(is_shown_to_fit),
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,
         no_change=no_change,
