@@ -35,7 +35,6 @@ class PlannedCycles:
         self.data_bytes = np.array([float(sort.data_bytes) for sort in self.sorts])[self.sort]
         """Process data of each cycle [bytes]."""
         self._filled = np.concatenate(([0], np.cumsum(self.data_bytes > 0)))
-        self._bytes = np.concatenate(([0.0], np.cumsum(self.data_bytes)))
         filled = np.flatnonzero(self.data_bytes)
         apart = np.diff(filled, append=filled[:1] + len(self.sort)) if len(filled) else np.ones(1, dtype=np.int64)
         self.apart = np.ones(len(self.sort), dtype=np.int64)
@@ -48,10 +47,11 @@ class PlannedCycles:
 
     def filled_before(self, number: Ints) -> Ints:
         """Number of cycles with process data before a cycle, from 0; it may be beyond the first hyperperiod."""
-        return _before(self._filled, number)
+        whole, rest = np.divmod(number, len(self.sort))
+        return np.asarray(whole * self._filled[-1] + self._filled[rest])
 
     def phase(self, places: Ints, data_bytes: npt.NDArray[Any], likely: int = 0) -> int:
-        """The cycle of the hyperperiod that period 0 of a recording is: where least is missing and too much.
+        """The cycle of the hyperperiod that period 0 of a recording is: the one with the best match of process data.
 
         Parameters
         ----------
@@ -63,16 +63,8 @@ class PlannedCycles:
         count = len(self.sort)
         pairs, often = np.unique(np.stack((places % count, data_bytes), axis=1), axis=0, return_counts=True)
         planned = self.data_bytes[(pairs[:, :1].astype(np.int64) + np.arange(count)) % count]
-        # A period without a frame lacks all that is planned for it.
-        first, end = (_before(self._bytes, place + np.arange(count)) for place in (places[0], places[-1] + 1))
-        wrong = end - first + often @ (np.abs(planned - pairs[:, 1:]) - planned)
-        return likely if wrong[likely] <= wrong.min() else int(np.argmin(wrong))
-
-
-def _before(sums: npt.NDArray[Any], number: Ints) -> npt.NDArray[Any]:
-    """Sum over the cycles before a cycle, from 0, of sums over the first 0, 1, ... cycles of the hyperperiod."""
-    whole, rest = np.divmod(number, len(sums) - 1)
-    return np.asarray(whole * sums[-1] + sums[rest])
+        match = often @ (planned - np.abs(planned - pairs[:, 1:]))
+        return likely if match[likely] >= match.max() else int(np.argmax(match))
 
 
 class SeenCycles(NamedTuple):
