@@ -19,7 +19,9 @@ _ELSEWHERE: Final = {
 }
 
 
-def read_machine(argument: str, *, bus: str | None, channel: str | None, progress: Progress) -> Reading:
+def read_machine(
+    argument: str, *, bus: str | None, channel: str | None, nodes: tuple[int, ...], progress: Progress
+) -> Reading:
     """Read a file.
 
     Parameters
@@ -28,6 +30,8 @@ def read_machine(argument: str, *, bus: str | None, channel: str | None, progres
         The file; "-" is standard input.
     bus, channel
         Name of the bus of a database, and of the channel of a log.
+    nodes
+        Node-IDs that an EDS stands for.
     progress
         Called with the bytes read of a recording and the size of its file [bytes].
 
@@ -52,7 +56,8 @@ def read_machine(argument: str, *, bus: str | None, channel: str | None, progres
         reading = read(content, name)
     else:
         # Values stand further to the front, and patterns take long on endless lines.
-        reading = read("\n".join(line[:_LONGEST_LINE] for line in text_of(content).split("\n")), name)
+        text = "\n".join(line[:_LONGEST_LINE] for line in text_of(content).split("\n"))
+        reading = read(text, name, nodes=nodes) if machine_format.module == "canopen" else read(text, name)
     return reading
 
 
