@@ -1,5 +1,6 @@
 """Readers of machines' files, each chosen by the content of a file."""
 
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Final
@@ -13,6 +14,8 @@ from busplan.questions.import_.reading import Reading
 MOST_BYTES: Final = 32_000_000
 """Largest file but a recording; the ENI of 500 devices has some 20 MB."""
 _LONGEST_LINE: Final = 1000
+_CAPTURE: Final = rb"[\xd4\x4d][\xc3\x3c]\xb2\xa1|\xa1\xb2[\xc3\x3c][\xd4\x4d]|\n\r\r\n"
+"""First bytes of pcap and pcapng."""
 _ELSEWHERE: Final = {
     "EtherCATInfo": "an ESI describes a kind of device and no machine; export the ENI of the machine",
     "TcSmProject": "a project of TwinCAT; export its ENI (EtherCAT, Export Configuration File)",
@@ -84,6 +87,11 @@ def recognised(content: bytes, *, name: str) -> Format:
         if tag in _ELSEWHERE:
             raise BusplanError(f"{name}: {_ELSEWHERE[tag]}")
         what = f"XML with a root <{tag[:60]}>, "
+    elif re.match(_CAPTURE, content):
+        raise BusplanError(
+            f"{name}: a capture, but not of SocketCAN: of EtherCAT import reads the ENI, `ethercat slaves -v` or "
+            f"slaveinfo, and `busplan measured PROFILE.toml {name}` holds the capture against the profile"
+        )
     elif not content.startswith(UTF_16) and b"\0" in content[:100_000]:
         what = "binary data, "
     raise BusplanError(f"{name}: {what}no format that busplan imports: {'; '.join(each.title for each in FORMATS)}")
