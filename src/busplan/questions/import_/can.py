@@ -261,7 +261,6 @@ def _of_node(number: int, node: Facts, cycle: Sequence[Pdo], period: Fact) -> It
             "period_us": beat,
         }
 
-
     if "emergency" in node:
         emergency = node["emergency"]
         yield {

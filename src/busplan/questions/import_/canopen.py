@@ -73,7 +73,10 @@ def node_ids(nodes: str | int | Iterable[int]) -> tuple[int, ...]:
     >>> node_ids("3"), node_ids("1-3,11"), node_ids(2), node_ids([5])
     ((1, 2, 3), (1, 2, 3, 11), (1, 2), (5,))
     """
-    shown, wanted = str(nodes)[:40], f"a number of nodes, as 8, or node-IDs from 1 to {_MOST_NODE}, each once, as 1-8,11"
+    shown, wanted = (
+        str(nodes)[:40],
+        f"a number of nodes, as 8, or node-IDs from 1 to {_MOST_NODE}, each once, as 1-8,11",
+    )
     refusal = BusplanError(f"nodes {shown}: expected {wanted}")
     if isinstance(nodes, str):
         if not re.fullmatch(r"\s*\d{1,3}(?:\s*[-,]\s*\d{1,3})*\s*", nodes):
