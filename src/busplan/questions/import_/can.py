@@ -294,32 +294,32 @@ def _joined(facts: Facts, machine: Reading) -> Facts:
     return seen | facts
 
 
-def _set_senders(messages: Sequence[Facts], machine: Reading, owners: dict[int, str]) -> None:
-    """Say of each message that CANopen shows to be of a node its group, the node, or the host.
-
-    By the PDOs and emergencies of the nodes' files, then by the predefined connection set. Who sends one of them in a
-    database is that node in its other messages, too.
-    """
+def _shown_senders(machine: Reading, owners: dict[int, str]) -> dict[int, tuple[str, str]]:
+    """Who sends an identifier, and how that is known: by the nodes' files, else by the predefined connection set."""
     devices = {
         number: HOST if "is_host" in facts else owners.get(number, f"{facts['name'].value}-{number}"[:100])
         for number, facts in machine.nodes.items()
     }
-    shown: dict[int, tuple[str, str]] = {}
-    if devices:
-        shown = dict.fromkeys(_OF_THE_HOST, (HOST, "by the predefined set"))
+    shown = dict.fromkeys(_OF_THE_HOST if devices else (), (HOST, "by the predefined set"))
     for number, device in devices.items():
         for starts, sender in ((_BY_THE_NODE, device), (_BY_THE_HOST, HOST)):
             shown |= {start + number: (sender, f"of node {number} by the predefined set") for start in starts}
-    for key, of_host in (("command", True), ("feedback", False)):
-        for number, facts in machine.nodes.items():
-            note = f"{'to' if of_host else 'of'} node {number}"
-            for pdo in facts[key].value:
-                shown[pdo.identifier] = (HOST if of_host else devices[number], note)
-    shown |= {
-        facts["emergency"].value: (devices[number], f"of node {number}")
-        for number, facts in machine.nodes.items()
-        if "emergency" in facts
-    }
+    for number, facts in machine.nodes.items():
+        shown |= {pdo.identifier: (HOST, f"to node {number}") for pdo in facts["command"].value}
+    # What a node sends to another is no command of the host.
+    for number, facts in machine.nodes.items():
+        sent = [pdo.identifier for pdo in facts["feedback"].value]
+        sent += [facts["emergency"].value] if "emergency" in facts else []
+        shown |= dict.fromkeys(sent, (devices[number], f"of node {number}"))
+    return shown
+
+
+def _set_senders(messages: Sequence[Facts], machine: Reading, owners: dict[int, str]) -> None:
+    """Say of each message that CANopen shows to be of a node its group, the node, or the host.
+
+    Who sends one of them in a database is that node in its other messages, too.
+    """
+    shown = _shown_senders(machine, owners)
     known: dict[object, set[str]] = {}
     for facts in messages:
         number = facts["identifier"].value

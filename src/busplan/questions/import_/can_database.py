@@ -34,8 +34,8 @@ _NUMBERED: Final = re.compile(r"\b(BO_|SG_|BO_TX_BU_|SIG_GROUP_) +(\d{4,9})\b")
 _MESSAGE: Final = re.compile(r"(<(?:\w+:)?Message\b)[^<>]*?\sid\s*=\s*[\"']([^\"'<>]{1,20})[\"'][^<>]*>")
 _MOST_STANDARD: Final = (1 << 11) - 1
 _WHOLE_SIGNAL: Final = re.compile(r"\s*SG_ .*\[.*\].*\"\s*\S")
-_NEXT_STEPS: Final = dict.fromkeys(("dbc", "sym", "kcd"), "; export it anew from the tool that wrote it") | {
-    "arxml": " of a CAN system; save the database as DBC in the tool that wrote it, and give that"
+_NEXT_STEPS: Final = dict.fromkeys(("dbc", "sym", "kcd"), "export it anew from the tool that wrote it") | {
+    "arxml": "save the database as DBC in the tool that wrote it, and give that"
 }
 """What to do where cantools cannot read a file."""
 _LINE: Final = re.compile(r"Invalid syntax at line (\d+), column (\d+)")
@@ -127,8 +127,9 @@ def _loaded(text: str, machine: Reading, dialect: str) -> Any:
     except Exception as error:  # noqa: BLE001 - the readers of formats fail in many ways
         # The words of its errors are about its own code; the place alone is the user's.
         position = _LINE.search(str(error))
-        place = f"{position[1]}:{position[2]}: invalid syntax" if position else "1: cantools cannot read it"
-        raise BusplanError(f"{name}:{place}: not a valid {title}{_NEXT_STEPS[dialect]}") from None
+        place = f"{position[1]}:{position[2]}" if position else "1"
+        why = "invalid syntax" if position else "cantools cannot read it"
+        raise BusplanError(f"{name}:{place}: not a valid {title}: {why}; {_NEXT_STEPS[dialect]}") from None
 
 
 def _mended(text: str, machine: Reading) -> str:

@@ -82,7 +82,7 @@ def node_ids(nodes: str | int | Iterable[int]) -> tuple[int, ...]:
         if not re.fullmatch(r"\s*\d{1,3}(?:\s*[-,]\s*\d{1,3})*\s*", nodes):
             raise refusal
         ends = [[int(end) for end in part.split("-")] for part in nodes.split(",")]
-        if any(len(part) > 2 or part[0] > part[-1] for part in ends):
+        if any(part not in ([part[0]], [part[0], max(part)]) for part in ends):
             raise refusal
         nodes = ends[0][0] if ends == [ends[0][:1]] else [n for part in ends for n in range(part[0], part[-1] + 1)]
     numbers = tuple(range(1, nodes + 1) if isinstance(nodes, int) else nodes)
