@@ -93,7 +93,7 @@ def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None)
             owner = machine.messages[number]["name"].value
             raise machine.refusal(line, f"message {message.name} has the identifier of {owner}: a bus has each once")
         values = {
-            "name": message.name,
+            "name": message.name or f"id-{message.frame_id:#x}",
             "payload_bytes": message.length,
             # One of several may not be told from the others.
             "sender": message.senders[0] if len(message.senders) == 1 else None,
