@@ -555,6 +555,7 @@ def import_command(
     bus: str | None = None,
     channel: str | None = None,
     period: str | None = None,
+    nodes: str | None = None,
     force: bool = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
@@ -580,6 +581,9 @@ def import_command(
     --period TIME
         Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is not
         shown to fit. [default: such messages are left out]
+    --nodes NODES
+        Nodes that one EDS stands for: their number, as 8, from node-ID 1 on, or their node-IDs, as 1-8,11.
+        [default: one]
     --force
         Let -o overwrite a file that is already there.
     """
@@ -602,6 +606,7 @@ def import_command(
                 bus=bus,
                 channel=channel,
                 period_us=None if period is None else time_us(period, option="--period"),
+                nodes=nodes,
                 progress=progress,
             )
         sentences = imported.sentences()

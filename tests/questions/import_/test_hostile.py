@@ -65,7 +65,7 @@ REFUSED = {
         ":1: messages of 2 buses, M, N: a profile is one bus; --bus NAME reads one",
     ),
     "a signal cut off": ("BO_ 256 A: 8 X\n SG_ B : 0|16@1+ (1,", ":2: ends within a signal: cut off"),
-    "no PDO": ("[DeviceInfo]\nProductName=x\n", ":1: no PDO that is sent"),
+    "no PDO": ("[DeviceInfo]\nProductName=x\n", ":1: no PDO is switched on"),
     "no number": (
         "[DeviceInfo]\n[1800sub1]\nDefaultValue=soon\n",
         ":3: defaultvalue 'soon': expected a number, as 384, 0x180",

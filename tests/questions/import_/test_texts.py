@@ -263,8 +263,8 @@ def test_identifiers_without_node_id_say_the_node(tmp_path: Path) -> None:
 def test_couplers_and_digital_terminals_are_known_by_their_type(tmp_path: Path) -> None:
     answer = changed(tmp_path, "ethercat-conf.xml", ('type="CP10"', 'type="EK1100"'), ('type="DI04"', 'type="EL1859"'))
     assert groups(answer) == [("EK1100", 1, 0, 0, 0), ("EL1859", 1, 1, 1, 0), *groups(answer)[2:]]
-    with pytest.raises(busplan.BusplanError, match=r"how many bytes device 1 \(EL3104\) has in a cycle is not known"):
-        changed(tmp_path, "ethercat-conf.xml", ('type="CP10"', 'type="EK1100"'), ('type="DI04"', 'type="EL3104"'))
+    with pytest.raises(busplan.BusplanError, match=r"how many bytes device 1 \(EL6900\) has in a cycle is not known"):
+        changed(tmp_path, "ethercat-conf.xml", ('type="CP10"', 'type="EK1100"'), ('type="DI04"', 'type="EL6900"'))
 
 
 def test_a_bus_of_one_device_has_no_heading(tmp_path: Path) -> None:

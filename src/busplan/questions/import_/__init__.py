@@ -18,6 +18,7 @@ from busplan.questions.base.sentences import document
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import PERIOD, network_of
 from busplan.questions.import_ import can, ethercat
+from busplan.questions.import_.canopen import node_ids
 from busplan.questions.import_.formats import read_machine
 from busplan.questions.import_.reading import Fact, ProfileLine, Reading, merged, profile_text
 from busplan.sections.profile import Profile
@@ -106,6 +107,7 @@ def import_profile(
     bus: str | None = None,
     channel: str | None = None,
     period_us: float | None = None,
+    nodes: str | int | Iterable[int] | None = None,
     progress: Progress | None = None,
 ) -> ImportAnswer:
     """Make a profile of the files of one machine.
@@ -124,6 +126,8 @@ def import_profile(
         Of a log of several channels, the name of one.
     period_us
         Period of every message that no file gives one; it is assumed, so the plan is not shown to fit [us].
+    nodes
+        Nodes that an EDS stands for: their number, from node-ID 1 on, or their node-IDs; as text "8" or "1-8,11".
     progress
         Called with the bytes read of a log and the size of the file [bytes].
 
@@ -152,7 +156,12 @@ def import_profile(
     if not names or len(set(names)) < len(names):
         raise BusplanError(f"paths {names!r}: expected files of one machine, each once")
     none = progress or (lambda _done, _total: None)
-    readings = [read_machine(each, bus=bus, channel=channel, progress=none) for each in names]
+    numbers = () if nodes is None else node_ids(nodes)
+    readings = [read_machine(each, bus=bus, channel=channel, nodes=numbers, progress=none) for each in names]
+    described = [reading.file for reading in readings if reading.nodes and reading.kind == "can"]
+    if nodes is not None and len(described) != 1:
+        found = f"{described[0]} and {described[1]} are both" if described else "none of the files is"
+        raise BusplanError(f"nodes: {found} an EDS; it says of which nodes one EDS is")
     logs = [reading.file for reading in readings if reading.is_log]
     if channel is not None and not logs:
         raise BusplanError(f"channel {channel}: none of the files is a CAN log")

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any, Final, NamedTuple
 
+from busplan.buses.can.frames import HOST
 from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.questions.import_.can_database import EXTENDED
@@ -28,6 +29,13 @@ _MOST_PDOS: Final = 4
 _SYNC_ID: Final = 0x80
 _MOST_NODE: Final = 127
 _HEARTBEAT_ID: Final = 0x700
+_OF_THE_HOST: Final = (0x000, 0x100)
+"""Identifiers of NMT and TIME in the predefined connection set (CiA 301); that of SYNC is in the profile."""
+_BY_THE_NODE: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, _HEARTBEAT_ID)
+_BY_THE_HOST: Final = (0x200, 0x300, 0x400, 0x500, 0x600)
+"""What each is added to a node-ID in that set: emergency, TPDOs, SDO and heartbeat; RPDOs and SDO."""
+_EMERGENCY_US: Final = 1_000_000.0
+"""An event of a fault, sent once for each: one in a second is assumed [us]."""
 BIT_RATE: Final = "bit_rate_kbit_s"
 LEAST, SHOWN = "least_bit_rate", "shown_bit_rate"
 """What a log alone says of the bit rate, for `settle`."""
@@ -69,9 +77,14 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         There are no messages either.
     """
     bus, nodes = machine.bus, list(_nodes(machine))
+    _require_slaves(machine)
+    runs = [[node for _, node in run] for _, run in groupby(enumerate(nodes), lambda item: _looks(item[0], item[1]))]
+    taken: set[str] = set()
+    groups = [(group_name(str(run[0].facts["name"].value), taken), run) for run in runs]
+    owners = {node.number: name for name, run in groups for node in run}
     extended = sum(number >= EXTENDED for number in machine.messages)
     bits = _EXTENDED_BITS if not nodes and 2 * extended > len(machine.messages) else _BASE_BITS
-    messages = list(_messages(machine, nodes, usual_bits=bits))
+    messages = list(_messages(machine, nodes, owners, usual_bits=bits))
     if not (nodes or messages):
         reason = "no message with a period, and no node with PDOs"
         raise BusplanError(f"{machine.file}: {reason}; {_ASSUME}", *machine.remarks)
@@ -89,14 +102,28 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         yield from lines("bus", {key: bus.get(key) for key in ("sync_identifier", "sync_counter")})
         yield ProfileLine("bus", "pipeline_cycles", assumed(1, "the host computes in the next cycle"))
         yield ProfileLine("cycle", "period_us", _period(machine))
-        taken: set[str] = set()
-        for _, run in groupby(enumerate(nodes), lambda item: _looks(item[0], item[1])):
-            yield from _group([node for _, node in run], taken)
+        for name, run in groups:
+            yield from _group(name, run)
     else:
         machine.remarks.append(
             f"Messages alone, {_cycle_words(machine)}: the EDS or DCF of each node beside the file adds the cycle"
         )
     yield from messages
+
+
+def _require_slaves(machine: Reading) -> None:
+    """Refuse a master alone: what is sent stands in the files of its slaves; name those that are missing."""
+    missing = [str(number) for number in machine.slaves if number not in machine.nodes or len(machine.nodes) == 1]
+    if not missing:
+        return
+    if not machine.messages and all("is_host" in facts for facts in machine.nodes.values()):
+        raise BusplanError(
+            f"{machine.file}: is of the CANopen master (0x1F80, 0x1F81), the host: give the DCF or EDS of its slaves "
+            "beside it"
+        )
+    machine.remarks.append(
+        f"{machine.file}: slaves of the master (0x1F81) without a file, so left out: node {first_of(missing, _LISTED)}"
+    )
 
 
 def _cycle_words(machine: Reading) -> str:
@@ -140,9 +167,9 @@ def _looks(place: int, node: _Node) -> tuple[Any, ...]:
     return (*sizes, *starts, node.every, node.facts["axes"].value)
 
 
-def _group(nodes: list[_Node], taken: set[str]) -> Iterator[ProfileLine]:
+def _group(name: str, nodes: list[_Node]) -> Iterator[ProfileLine]:
     first, identity = nodes[0], nodes[0].facts["node_id"]
-    section = f"group.{group_name(str(first.facts['name'].value), taken)}"
+    section = f"group.{name}"
     numbers = f"{first.number} to {nodes[-1].number}" if len(nodes) > 1 else f"{first.number}"
     note = ", ".join(filter(None, (f"node-ID {numbers}", identity.note)))
     facts = {"nodes": identity._replace(value=len(nodes), note=note), "axes": first.facts["axes"]}
@@ -163,8 +190,10 @@ def _group(nodes: list[_Node], taken: set[str]) -> Iterator[ProfileLine]:
     yield from execution_lines(section, base, assumed(0.1, "what each byte adds"))
 
 
-def _messages(machine: Reading, nodes: Sequence[_Node], *, usual_bits: int) -> Iterator[ProfileLine]:
-    """Every message that is in no cycle: of databases and logs, PDOs that the cycle has not, heartbeats.
+def _messages(
+    machine: Reading, nodes: Sequence[_Node], owners: dict[int, str], *, usual_bits: int
+) -> Iterator[ProfileLine]:
+    """Every message that is in no cycle: of databases and logs, PDOs that the cycle has not, heartbeats, emergencies.
 
     Parameters
     ----------
@@ -172,6 +201,8 @@ def _messages(machine: Reading, nodes: Sequence[_Node], *, usual_bits: int) -> I
         What the files say.
     nodes
         Nodes in the cycle; with any, SYNC is no message.
+    owners
+        The group of each of them by its node-ID.
     usual_bits
         Length of identifiers that a message need not say [bits].
     """
@@ -182,16 +213,15 @@ def _messages(machine: Reading, nodes: Sequence[_Node], *, usual_bits: int) -> I
         used.add(machine.bus["sync_identifier"].value if "sync_identifier" in machine.bus else _SYNC_ID)
     left_out: dict[str, list[str]] = {}
     messages = [
-        *(
-            facts
-            for number, node in sorted(machine.nodes.items())
-            for facts in _of_node(number, node, cycle.get(number, []), _period(machine))
-        ),
-        *(
-            {"identifier": Fact(identifier, facts["name"].place), **facts}
-            for identifier, facts in sorted(machine.messages.items())
-        ),
+        _joined(facts, machine)
+        for number, node in sorted(machine.nodes.items())
+        for facts in _of_node(number, node, cycle.get(number, []), _period(machine))
     ]
+    messages += (
+        {"identifier": Fact(identifier, facts["name"].place), **facts}
+        for identifier, facts in sorted(machine.messages.items())
+    )
+    _set_senders(messages, machine, owners)
     for facts in messages:
         name = str(facts["name"].value)
         if facts["identifier"].value in used:
@@ -230,6 +260,80 @@ def _of_node(number: int, node: Facts, cycle: Sequence[Pdo], period: Fact) -> It
             "payload_bytes": Fact(1, beat.place, note="the state of the node (CiA 301)"),
             "period_us": beat,
         }
+
+    if "emergency" in node:
+        emergency = node["emergency"]
+        yield {
+            "name": Fact(f"{name}-emergency", emergency.place),
+            "identifier": emergency,
+            "payload_bytes": Fact(_FRAME_BYTES, emergency.place, note="error code, register and data (CiA 301)"),
+            "period_us": node.get("emergency_us") or assumed(_EMERGENCY_US, "an event of a fault; one in a second"),
+        }
+
+
+def _joined(facts: Facts, machine: Reading) -> Facts:
+    """A message of a node with what a database and a log say of it: its name, and how often it was seen."""
+    number = facts["identifier"].value
+    seen = dict(machine.messages.get(number, {}))
+    if not seen:
+        return facts
+    facts = dict(facts)
+    if seen["name"].value != f"id-{number:#x}":
+        del facts["name"]
+    if seen["payload_bytes"].value > facts["payload_bytes"].value:
+        del facts["payload_bytes"]
+    stated, other = facts.get("period_us"), seen.get("period_us")
+    if stated and other and stated.grade == "assumed":
+        del facts["period_us"]
+    elif stated and other and other.value < stated.value * (1 - _CLEARLY):
+        del facts["period_us"]
+        machine.remarks.append(
+            f"{(seen | facts)['name'].value} comes every {other.value:,.0f} us by {other.place}, every "
+            f"{stated.value:,.0f} by {stated.place}: the shorter is taken"
+        )
+    return seen | facts
+
+
+def _shown_senders(machine: Reading, owners: dict[int, str]) -> dict[int, tuple[str, str]]:
+    """Who sends an identifier, and how that is known: by the nodes' files, else by the predefined connection set."""
+    devices = {
+        number: HOST if "is_host" in facts else owners.get(number, f"{facts['name'].value}-{number}"[:100])
+        for number, facts in machine.nodes.items()
+    }
+    shown = dict.fromkeys(_OF_THE_HOST if devices else (), (HOST, "by the predefined set"))
+    for number, device in devices.items():
+        for starts, sender in ((_BY_THE_NODE, device), (_BY_THE_HOST, HOST)):
+            shown |= {start + number: (sender, f"of node {number} by the predefined set") for start in starts}
+    for number, facts in machine.nodes.items():
+        shown |= {pdo.identifier: (HOST, f"to node {number}") for pdo in facts["command"].value}
+    # What a node sends to another is no command of the host.
+    for number, facts in machine.nodes.items():
+        sent = [pdo.identifier for pdo in facts["feedback"].value]
+        sent += [facts["emergency"].value] if "emergency" in facts else []
+        shown |= dict.fromkeys(sent, (devices[number], f"of node {number}"))
+    return shown
+
+
+def _set_senders(messages: Sequence[Facts], machine: Reading, owners: dict[int, str]) -> None:
+    """Say of each message that CANopen shows to be of a node its group, the node, or the host.
+
+    Who sends one of them in a database is that node in its other messages, too.
+    """
+    shown = _shown_senders(machine, owners)
+    known: dict[object, set[str]] = {}
+    for facts in messages:
+        number = facts["identifier"].value
+        if number in shown:
+            sender, note = shown[number]
+            if "sender" in facts:
+                known.setdefault(facts["sender"].value, set()).add(sender)
+                note = f"{note}, {facts['sender'].value} in {facts['sender'].place}"
+            facts["sender"] = Fact(sender, "", "derived", note)
+    for facts in messages:
+        if "sender" in facts and facts["identifier"].value not in shown:
+            device = facts["sender"]
+            if len(same := known.get(device.value, set())) == 1:
+                facts["sender"] = Fact(*same, device.place, "derived", f"{device.value} sends its messages, too")
 
 
 def _is_fd(facts: Facts) -> bool:

@@ -2,12 +2,13 @@
 
 import logging
 import re
+from contextlib import suppress
 from typing import Any, Final
 
 from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
-from busplan.questions.import_.reading import Reading
+from busplan.questions.import_.reading import Reading, whole_number
 from busplan.questions.import_.xml import parsed
 
 EXTENDED: Final = 1 << 31
@@ -30,8 +31,13 @@ _ATTRIBUTE: Final = re.compile(
 _DEFINED: Final = re.compile(r"^[ \t]*BA_DEF_(?:REL_)? +(?:\w+_ +)?\"([^\"\n]*)\"", re.MULTILINE)
 _NUMBERED: Final = re.compile(r"\b(BO_|SG_|BO_TX_BU_|SIG_GROUP_) +(\d{4,9})\b")
 """A message's number where it is 4 to 9 digits long: without bit 31, which makes it 10."""
+_MESSAGE: Final = re.compile(r"(<(?:\w+:)?Message\b)[^<>]*?\sid\s*=\s*[\"']([^\"'<>]{1,20})[\"'][^<>]*>")
 _MOST_STANDARD: Final = (1 << 11) - 1
 _WHOLE_SIGNAL: Final = re.compile(r"\s*SG_ .*\[.*\].*\"\s*\S")
+_NEXT_STEPS: Final = dict.fromkeys(("dbc", "sym", "kcd"), "export it anew from the tool that wrote it") | {
+    "arxml": "save the database as DBC in the tool that wrote it, and give that"
+}
+"""What to do where cantools cannot read a file."""
 _LINE: Final = re.compile(r"Invalid syntax at line (\d+), column (\d+)")
 _KILO: Final = 1000
 _LISTED: Final = 8
@@ -87,7 +93,7 @@ def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None)
             owner = machine.messages[number]["name"].value
             raise machine.refusal(line, f"message {message.name} has the identifier of {owner}: a bus has each once")
         values = {
-            "name": message.name,
+            "name": message.name or f"id-{message.frame_id:#x}",
             "payload_bytes": message.length,
             # One of several may not be told from the others.
             "sender": message.senders[0] if len(message.senders) == 1 else None,
@@ -111,23 +117,23 @@ def _loaded(text: str, machine: Reading, dialect: str) -> Any:
         if last.lstrip().startswith("SG_ ") and not _WHOLE_SIGNAL.match(last):
             raise BusplanError(f"{name}:{text.rstrip().count(chr(10)) + 1}: ends within a signal: cut off?")
         text = _mended(text, machine)
+        # Signals do not matter here, and take most of the time; where they stand otherwise cantools finds them itself.
+        with suppress(Exception):
+            return load_string(_SIGNALS.sub(_blank, text), dialect, strict=False)
+    if dialect == "kcd":
+        text = _marked(text, machine)
     try:
         return load_string(text, dialect, strict=False)
     except Exception as error:  # noqa: BLE001 - the readers of formats fail in many ways
-        message = " ".join(str(error).removeprefix(f"{title}: ").split())[:200]
-        if type(error).__module__.partition(".")[0] != "cantools":
-            message = f"cantools cannot read it ({type(error).__name__}: {message})"
-        position = _LINE.search(message)
+        # The words of its errors are about its own code; the place alone is the user's.
+        position = _LINE.search(str(error))
         place = f"{position[1]}:{position[2]}" if position else "1"
-        raise BusplanError(
-            f"{name}:{place}: not a valid {title}: {'invalid syntax' if position else message}"
-        ) from None
+        why = "invalid syntax" if position else "cantools cannot read it"
+        raise BusplanError(f"{name}:{place}: not a valid {title}: {why}; {_NEXT_STEPS[dialect]}") from None
 
 
 def _mended(text: str, machine: Reading) -> str:
-    """A DBC as cantools takes it, with the same lines: without signals, undefined attributes, or a missing bit 31."""
-    # Signals do not matter here, and take most of the time.
-    text = _SIGNALS.sub(_blank, text)
+    """A DBC as cantools takes it, with the same lines: without undefined attributes, or a missing bit 31."""
     defined = set(_DEFINED.findall(text))
     undefined = sorted({name for name in _ATTRIBUTE.findall(text) if name not in defined})
     if undefined:
@@ -140,11 +146,33 @@ def _mended(text: str, machine: Reading) -> str:
         text = _NUMBERED.sub(
             lambda match: f"{match[1]} {int(match[2]) + EXTENDED * (int(match[2]) > _MOST_STANDARD)}", text
         )
-        machine.remarks.append(
-            f"{machine.file}: identifiers over 11 bits without bit 31 are taken for 29 bits: "
-            f"{first_of([f'0x{number:08X}' for number in sorted(short)], _LISTED)}"
-        )
+        _say_extended(short, machine)
     return text
+
+
+def _marked(text: str, machine: Reading) -> str:
+    """A KCD whose identifiers over 11 bits have the mark of 29."""
+    short: set[int] = set()
+
+    def marked(match: re.Match[str]) -> str:
+        number = whole_number(match[2])
+        if number is None or number <= _MOST_STANDARD or re.search(r"\sformat\s*=", match[0]):
+            return match[0]
+        short.add(number)
+        return f'{match[1]} format="extended"{match[0][len(match[1]) :]}'
+
+    text = _MESSAGE.sub(marked, text)
+    if short:
+        _say_extended(short, machine)
+    return text
+
+
+def _say_extended(numbers: set[int], machine: Reading) -> None:
+    mark = "bit 31" if machine.title == "DBC" else 'format="extended"'
+    machine.remarks.append(
+        f"{machine.file}: identifiers over 11 bits without {mark} are taken for 29 bits: "
+        f"{first_of([f'0x{number:08X}' for number in sorted(numbers)], _LISTED)}"
+    )
 
 
 def _blank(match: re.Match[str]) -> str:

@@ -1,10 +1,12 @@
 """CANopen EDS and DCF (CiA 306): PDOs with identifiers, mapping and transmission type, SYNC, heartbeat, node-ID."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import ceil
 from typing import Final, NamedTuple
 
+from busplan.english import first_of
+from busplan.errors import BusplanError
 from busplan.questions.import_.reading import ControlWords, Facts, Reading, assumed
 
 _SECTION: Final = re.compile(r"\s*\[([^\]\n]{1,100})\]\s*$")
@@ -14,6 +16,10 @@ _NUMBER: Final = re.compile(
 )
 _TPDO, _RPDO, _MAPPING, _MOST_PDOS = 0x1800, 0x1400, 0x200, 512
 _SYNC_ID, _SYNC_PERIOD, _HEARTBEAT, _SYNC_COUNTER = 0x1005, 0x1006, 0x1017, 0x1019
+_EMERGENCY, _EMERGENCY_INHIBIT = 0x1014, 0x1015
+_EMERGENCY_ID: Final = 0x80
+_STARTUP, _SLAVES, _IS_MASTER, _IS_SLAVE = 0x1F80, 0x1F81, 1, 1
+"""Objects of the NMT master with their lowest bits: it is the master, and a node is its slave (CiA 302-2)."""
 _INVALID: Final = 1 << 31
 _EXTENDED: Final = 1 << 29
 _IDENTIFIER: Final = (1 << 11) - 1
@@ -23,6 +29,7 @@ _PREDEFINED_PDOS: Final = 4
 """PDOs of a direction whose identifiers are 0x180 to 0x500 and the node-ID (CiA 301)."""
 _MOST_MAPPED: Final = 64
 _INHIBIT_US: Final = 100
+_LISTED: Final = 4
 _SYNC_BITS: Final = 47
 """Shortest frame without data, interframe space included (ISO 11898-1)."""
 _FASTEST_KBIT_S: Final = 1000
@@ -53,13 +60,54 @@ class Pdo(NamedTuple):
     name: str
 
 
-def read(text: str, name: str) -> Reading:
-    """Read an EDS or DCF.
+def node_ids(nodes: str | int | Iterable[int]) -> tuple[int, ...]:
+    """Node-IDs that a number of nodes, or a list of node-IDs, stands for.
 
     Raises
     ------
     BusplanError
-        A number is none, or it is a device without PDOs; with its line.
+        It is neither, or a node-ID is not 1 to 127 or comes twice.
+
+    Examples
+    --------
+    >>> node_ids("3"), node_ids("1-3,11"), node_ids(2), node_ids([5])
+    ((1, 2, 3), (1, 2, 3, 11), (1, 2), (5,))
+    """
+    shown, wanted = (
+        str(nodes)[:40],
+        f"a number of nodes, as 8, or node-IDs from 1 to {_MOST_NODE}, each once, as 1-8,11",
+    )
+    refusal = BusplanError(f"nodes {shown}: expected {wanted}")
+    if isinstance(nodes, str):
+        if not re.fullmatch(r"\s*\d{1,3}(?:\s*[-,]\s*\d{1,3})*\s*", nodes):
+            raise refusal
+        ends = [[int(end) for end in part.split("-")] for part in nodes.split(",")]
+        if any(part not in ([part[0]], [part[0], max(part)]) for part in ends):
+            raise refusal
+        nodes = ends[0][0] if ends == [ends[0][:1]] else [n for part in ends for n in range(part[0], part[-1] + 1)]
+    numbers = tuple(range(1, nodes + 1) if isinstance(nodes, int) else nodes)
+    if not numbers or len(set(numbers)) < len(numbers) or not all(1 <= number <= _MOST_NODE for number in numbers):
+        raise refusal
+    return numbers
+
+
+def read(text: str, name: str, *, nodes: tuple[int, ...] = ()) -> Reading:
+    """Read an EDS or DCF.
+
+    Parameters
+    ----------
+    text
+        The text.
+    name
+        Name of the file in messages.
+    nodes
+        Node-IDs of the nodes that an EDS stands for; without them it is one.
+
+    Raises
+    ------
+    BusplanError
+        A number is none, it is a device without PDOs, or a DCF, with a node-ID of its own, stands for other nodes; with
+        its line.
     """
     sections = _sections(text)
     setup = sections.get("devicecomissioning") or sections.get("devicecommissioning") or {}
@@ -69,28 +117,78 @@ def read(text: str, name: str) -> Reading:
     node = device.number(setup, "nodeid") or device.node_of_identifiers() or _Number(1, 1)
     if not 1 <= node.value <= _MOST_NODE:
         raise machine.refusal(node.line, f"NodeID {node.value}: expected 1 to {_MOST_NODE}")
-    device.node, words = node.value, ControlWords()
-    title, line = setup.get("nodename") or sections.get("deviceinfo", {}).get("productname") or ("node", 1)
+    if is_set and nodes:
+        raise machine.refusal(
+            setup["nodeid"][1], f"NodeID {node.value} is set: a DCF is of one node; --nodes is for an EDS"
+        )
+    device.node = node.value
     machine.bus = _bus(device, setup)
-    facts = machine.nodes[node.value] = {
-        "name": machine.fact(title or "node", line),
-        "node_id": machine.fact(*node)
-        if is_set
-        else assumed(node.value, "no NodeID in the file" + (", that of its identifiers" if node.line > 1 else "")),
-        "feedback": machine.fact(tuple(device.pdos(_TPDO, ControlWords())), 1),
-        "command": machine.fact(tuple(device.pdos(_RPDO, words)), 1),
-        "axes": words.axes(machine, line=1),
-    }
-    if not facts["feedback"].value and not facts["command"].value:
-        raise machine.refusal(1, "no PDO that is sent and has a mapping")
-    if (beat := device.value(_HEARTBEAT)) and beat.value:
-        facts["heartbeat_us"] = machine.fact(beat.value * 1000, beat.line)
-    if not is_set:
+    title, line = setup.get("nodename") or sections.get("deviceinfo", {}).get("productname") or ("node", 1)
+    for number in nodes or (node.value,):
+        device.node = number
+        facts = machine.nodes[number] = {"name": machine.fact(title or "node", line)}
+        if nodes:
+            facts["node_id"] = assumed(number, "--nodes")
+        elif is_set:
+            facts["node_id"] = machine.fact(*node)
+        else:
+            note = "no NodeID in the file" + (", that of its identifiers" if node.line > 1 else "")
+            facts["node_id"] = assumed(number, note)
+        facts |= _node(device)
+    if len(nodes) > 1:
+        _require_apart(machine)
+    if slaves := device.slaves():
+        machine.rank, machine.slaves = -1, slaves
+    elif not is_set and not nodes:
         machine.remarks.append(
             f"{name}: without NodeID under [DeviceComissioning] it is read as an EDS, the defaults of a device, here "
-            f"as node {node.value}; give the DCF of the node, which the tool that configures it writes"
+            f"as node {node.value}; give the DCF of the node, which the tool that configures it writes, or the nodes "
+            "that it stands for by --nodes"
         )
     return machine
+
+
+def _node(device: "_Device") -> Facts:
+    """What a node sends and takes. The PDOs of a master are those of its slaves, the other way round."""
+    machine, words = device.machine, ControlWords()
+    if is_master := bool(device.slaves()):
+        facts = {"is_host": machine.fact(True, 1), "feedback": machine.fact((), 1), "command": machine.fact((), 1)}
+    else:
+        facts = {
+            "feedback": machine.fact(tuple(device.pdos(_TPDO, ControlWords())), 1),
+            "command": machine.fact(tuple(device.pdos(_RPDO, words)), 1),
+            "axes": words.axes(machine, line=1),
+        }
+    if not (is_master or facts["feedback"].value or facts["command"].value):
+        off = f" ({first_of(device.off, _LISTED)})" if device.off else ""
+        raise machine.refusal(
+            1,
+            f"no PDO is switched on and has a mapping{off}: switch them on in the tool that configures the node, and "
+            "give the DCF that it writes",
+        )
+    if (beat := device.value(_HEARTBEAT)) and beat.value:
+        facts["heartbeat_us"] = machine.fact(beat.value * 1000, beat.line)
+    emergency = device.value(_EMERGENCY)
+    if emergency and not emergency.value & (_INVALID | _EXTENDED):
+        identifier = emergency.value & _IDENTIFIER
+        # Some files leave the node-ID out, and 0x80 itself is SYNC.
+        identifier += device.node * (identifier == _EMERGENCY_ID)
+        facts["emergency"] = machine.fact(identifier, emergency.line, note=f"0x{_EMERGENCY:X}")
+        if (inhibit := device.value(_EMERGENCY_INHIBIT)) and inhibit.value:
+            facts["emergency_us"] = machine.fact(inhibit.value * _INHIBIT_US, inhibit.line, note="inhibit time")
+    return facts
+
+
+def _require_apart(machine: Reading) -> None:
+    """Refuse identifiers that several nodes have: without $NODEID they are those of one."""
+    owners: dict[int, int] = {}
+    for number, facts in machine.nodes.items():
+        for pdo in facts["feedback"].value:
+            if owners.setdefault(pdo.identifier, number) != number:
+                raise BusplanError(
+                    f"{pdo.place}: {pdo.name} of node {owners[pdo.identifier]} and of node {number} would both be "
+                    f"0x{pdo.identifier:x}, without $NODEID: give the DCF of each node"
+                )
 
 
 def _bus(device: "_Device", setup: _Section) -> Facts:
@@ -122,6 +220,8 @@ class _Device:
 
     def __init__(self, sections: dict[str, _Section], machine: Reading) -> None:
         self.sections, self.machine, self.node = sections, machine, 1
+        self.off: list[str] = []
+        """PDOs that are not sent, with the reason."""
 
     def number(self, section: _Section, key: str) -> _Number | None:
         """A number, the node-ID in it added; None where it is missing or empty."""
@@ -158,15 +258,27 @@ class _Device:
         nodes = {identifier & _MOST_NODE for identifier, _ in fixed if not identifier & _INVALID}
         return _Number(nodes.pop(), fixed[0][1]) if len(nodes) == 1 and nodes != {0} else None
 
+    def slaves(self) -> tuple[int, ...]:
+        """The master's own node-ID, or those of its slaves where it lists them; none for another device."""
+        startup = self.value(_STARTUP)
+        listed = ((node, self.value(_SLAVES, node)) for node in range(1, _MOST_NODE + 1))
+        slaves = tuple(node for node, entry in listed if entry and entry.value & _IS_SLAVE)
+        return slaves or ((self.node,) if startup and startup.value & _IS_MASTER else ())
+
     def pdos(self, first: int, words: ControlWords) -> Iterator[Pdo]:
         """The PDOs of a direction that are sent; control words that they have go into `words`."""
         direction = "TPDO" if first == _TPDO else "RPDO"
         for number in range(_MOST_PDOS):
             identifier = self.value(first + number, 1)
-            if identifier is None or identifier.value & _INVALID:
+            if identifier is None:
+                continue
+            name = f"{direction}{number + 1}"
+            if identifier.value & _INVALID:
+                self.off.append(f"{name}: bit 31 of 0x{first + number:X}sub1")
                 continue
             size = self._mapped_bytes(first + _MAPPING + number, words)
             if not size:
+                self.off.append(f"{name}: no object in 0x{first + _MAPPING + number:X}")
                 continue
             if identifier.value & _EXTENDED:
                 raise self.machine.refusal(identifier.line, "a PDO of 29 bits; a profile's PDOs have 11")
@@ -176,7 +288,7 @@ class _Device:
             if inhibit and inhibit.value:
                 us, timer = inhibit.value * _INHIBIT_US, "inhibit time"
             place = self.machine.place(identifier.line)
-            yield Pdo(identifier.value & _IDENTIFIER, size, every, us, timer, place, f"{direction}{number + 1}")
+            yield Pdo(identifier.value & _IDENTIFIER, size, every, us, timer, place, name)
 
     def _mapped_bytes(self, index: int, words: ControlWords) -> int:
         count = self.value(index, 0) or _Number(0, 0)

@@ -1,5 +1,6 @@
 """Readers of machines' files, each chosen by the content of a file."""
 
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Final
@@ -13,13 +14,17 @@ from busplan.questions.import_.reading import Reading
 MOST_BYTES: Final = 32_000_000
 """Largest file but a recording; the ENI of 500 devices has some 20 MB."""
 _LONGEST_LINE: Final = 1000
+_CAPTURE: Final = rb"[\xd4\x4d][\xc3\x3c]\xb2\xa1|\xa1\xb2[\xc3\x3c][\xd4\x4d]|\n\r\r\n"
+"""First bytes of pcap and pcapng."""
 _ELSEWHERE: Final = {
     "EtherCATInfo": "an ESI describes a kind of device and no machine; export the ENI of the machine",
     "TcSmProject": "a project of TwinCAT; export its ENI (EtherCAT, Export Configuration File)",
 }
 
 
-def read_machine(argument: str, *, bus: str | None, channel: str | None, progress: Progress) -> Reading:
+def read_machine(
+    argument: str, *, bus: str | None, channel: str | None, nodes: tuple[int, ...], progress: Progress
+) -> Reading:
     """Read a file.
 
     Parameters
@@ -28,6 +33,8 @@ def read_machine(argument: str, *, bus: str | None, channel: str | None, progres
         The file; "-" is standard input.
     bus, channel
         Name of the bus of a database, and of the channel of a log.
+    nodes
+        Node-IDs that an EDS stands for.
     progress
         Called with the bytes read of a recording and the size of its file [bytes].
 
@@ -52,7 +59,8 @@ def read_machine(argument: str, *, bus: str | None, channel: str | None, progres
         reading = read(content, name)
     else:
         # Values stand further to the front, and patterns take long on endless lines.
-        reading = read("\n".join(line[:_LONGEST_LINE] for line in text_of(content).split("\n")), name)
+        text = "\n".join(line[:_LONGEST_LINE] for line in text_of(content).split("\n"))
+        reading = read(text, name, nodes=nodes) if machine_format.module == "canopen" else read(text, name)
     return reading
 
 
@@ -79,6 +87,11 @@ def recognised(content: bytes, *, name: str) -> Format:
         if tag in _ELSEWHERE:
             raise BusplanError(f"{name}: {_ELSEWHERE[tag]}")
         what = f"XML with a root <{tag[:60]}>, "
+    elif re.match(_CAPTURE, content):
+        raise BusplanError(
+            f"{name}: a capture, but not of SocketCAN: of EtherCAT import reads the ENI, `ethercat slaves -v` or "
+            f"slaveinfo, and `busplan measured PROFILE.toml {name}` holds the capture against the profile"
+        )
     elif not content.startswith(UTF_16) and b"\0" in content[:100_000]:
         what = "binary data, "
     raise BusplanError(f"{name}: {what}no format that busplan imports: {'; '.join(each.title for each in FORMATS)}")

@@ -75,12 +75,12 @@ def _device(slave: Element, number: int, machine: Reading) -> None:
                     words.add(index, sub, length and length.value, entry.line)
         facts |= {key: machine.bytes_of(bits[direction], line) for direction, key in _DIRECTIONS.items()}
         facts["axes"] = words.axes(machine, line=line)
-    elif kind in (known := _terminals())["inputs"] | known["outputs"]:
+    elif kind in (known := _terminals())["inputs"] | known["outputs"] and not _switches(slave):
         facts |= {
             key: machine.bytes_of(known[way].get(kind, 0), slave.line)
             for way, key in (("inputs", "read_bytes"), ("outputs", "write_bytes"))
         }
-        facts["axes"] = machine.fact(0, slave.line, "derived", "a coupler or a digital terminal")
+        facts["axes"] = machine.fact(known["axes"].get(kind, 0), slave.line, "derived", f"of {kind}, by its driver")
     clock = slave.first("dcConf")
     if clock:
         facts["clock_us"] = machine.fact(0.0, clock.line)
@@ -90,11 +90,16 @@ def _device(slave: Element, number: int, machine: Reading) -> None:
         facts["shift_us"] = machine.fact(int(shift) / 1000, clock.line, "derived", "from the master's task on")
 
 
+def _switches(slave: Element) -> bool:
+    """Whether the file switches process data on or off, which the table has not."""
+    return any(each.attributes.get("name", "").lower().startswith("enable") for each in slave.all("modParam"))
+
+
 @cache
 def _terminals() -> dict[str, dict[str, int]]:
-    """Bits of the inputs and of the outputs of devices by their type."""
+    """Bits of the inputs and of the outputs of devices, and axes of drives, by their type."""
     table: dict[str, Any] = tomllib.loads((files(__package__) / "terminals.toml").read_text(encoding="utf-8"))
-    return {way: table[way] for way in ("inputs", "outputs")}
+    return {way: table[way] for way in ("inputs", "outputs", "axes")}
 
 
 def _number(element: Element, key: str, machine: Reading, *, most: int) -> Fact | None:

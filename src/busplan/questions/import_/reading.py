@@ -81,6 +81,8 @@ class Reading:
     """Whether the file is a recording of the bus."""
     is_database: bool = False
     """Whether the file is a database of messages."""
+    slaves: tuple[int, ...] = ()
+    """Of the DCF of a CANopen master the node-IDs of its slaves, or its own where it lists none."""
     remarks: list[str] = field(default_factory=list)
     """Sentences on what the file says and a profile cannot, or what the file leaves open."""
 
@@ -181,6 +183,7 @@ def merged(readings: Iterable[Reading]) -> Reading:
             # Bit 31 is that of identifiers of 29 bits.
             shown = f"0x{number % (1 << 31):0{8 if number >> 31 else 3}X}"
             _add(known, facts, f"{(known | facts)['name'].value} ({shown}): ", differences)
+        machine.slaves += reading.slaves
         machine.remarks += reading.remarks
     if machine.kind == "ethercat":
         _require_one_machine(ranked)
