@@ -122,15 +122,24 @@ def servos_us(
     return float(wire.now * bit_us)
 
 
-def modbus_us(rate: float, nodes: int, *, read: int, write: int, node_us: float, is_exchange: bool) -> float:
+def registers(size: int, requests: int = 1) -> list[bytes]:
+    """Data of each request that has a share of some bytes: registers of two bytes, the last one filled up."""
+    whole = [b"rr"] * -(-size // 2)
+    return [b"".join(whole[request::requests]) for request in range(requests)]
+
+
+def modbus_us(
+    rate: float, nodes: int, *, read: int, write: int, node_us: float, is_exchange: bool, reads: int = 1
+) -> float:
     """A cycle of Modbus RTU: silence ends each frame, and a node answers behind it."""
     wire, bit_us = Wire(11), Fraction(1000) / Fraction(rate)
     silence = Fraction(77, 2) if rate <= 19.2 else Fraction(1750) / bit_us
     frames = (
-        [(b"af" + bytes(4) + bytes(4) + b"n" + bytes(write) + b"cc", b"afn" + bytes(read) + b"cc")] * nodes
+        [(b"af" + bytes(4) + bytes(4) + b"n" + registers(write)[0] + b"cc", b"afn" + registers(read)[0] + b"cc")]
+        * nodes
         if is_exchange
-        else [(b"afaaqqcc", b"afn" + bytes(read) + b"cc")] * nodes
-        + [(b"afaaqqn" + bytes(write) + b"cc", b"afaaqqcc")] * nodes
+        else [(b"afaaqqcc", b"afn" + data + b"cc") for data in registers(read, reads)] * nodes
+        + [(b"afaaqqn" + registers(write)[0] + b"cc", b"afaaqqcc")] * nodes
     )
     for request, answer in frames:
         wire.send(request)

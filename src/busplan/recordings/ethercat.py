@@ -47,8 +47,8 @@ class Datagram(NamedTuple):
     data_bytes: int
 
     @property
-    def is_process_data(self) -> bool:
-        """Whether it has a logical address: that of the process image."""
+    def is_logical(self) -> bool:
+        """Whether it has a logical address: that of process data, or of a read of the master's own."""
         return self.command in LOGICAL
 
 

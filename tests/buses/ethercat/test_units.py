@@ -251,6 +251,18 @@ def test_a_cycle_without_process_data_sends_no_frame() -> None:
     assert result.own["mean_utilisation"] == pytest.approx((result.required_us + vendors.required_us) / 2 / 500)
 
 
+def test_a_cycle_without_process_data_has_the_masters_datagrams_alone() -> None:
+    # NOP 4, APWR 4, BRD 2 and ARMW 4, 12 bytes each beside their data, and 40 of the frame.
+    plan = profile([(2, 1, 100, 0)], master="acontis", distributed_clocks=True)
+    filled_us, empty_us = (busplan.timeline(plan, timing_model="last-byte", cycle=cycle) for cycle in (1, 2))
+    assert filled_us.required_us == pytest.approx(20 + E_BUS_US + (40 + 62 + 12 + 100) * BYTE_US)
+    assert empty_us.required_us == pytest.approx(20 + E_BUS_US + (40 + 62) * BYTE_US)
+    drawn_us = sum(event.duration_us for event in empty_us.cycle_events if event.term)
+    assert drawn_us == pytest.approx(empty_us.required_us)
+    mean_us = (filled_us.required_us + empty_us.required_us) / 2
+    assert deciding(plan).own["mean_utilisation"] == pytest.approx(mean_us / 500)
+
+
 @given(st.lists(st.integers(1, 100), min_size=2, max_size=5), st.integers(2, 4))
 def test_units_of_one_rate_are_spread_within_a_third_of_the_most_even(sizes: list[int], every: int) -> None:
     def fullest(first: Sequence[int]) -> int:

@@ -78,6 +78,7 @@ def test_profibus_lies_between_its_ends_and_the_ends_are_simulated(
         bus__global_control=is_isochronous,
         payload__read_bytes=read,
         payload__write_bytes=write,
+        bus__clock_tolerance=0.0,
         cycle__nonperiodic_us=0.0,
         cycle__period_us=1e6,
     )
@@ -143,14 +144,84 @@ def test_servos_are_those_of_the_simulation(
     assert required_us(profile) == pytest.approx(simulated_us, rel=1e-9)
 
 
-@pytest.mark.parametrize("rate", [9.6, 19.2, 38.4, 115.2])
-@pytest.mark.parametrize("way", ["exchange", "single"])
-def test_modbus_is_that_of_the_simulation(rate: float, way: str) -> None:
-    profile = servo(
-        bus__protocol="modbus-rtu", bus__bit_rate_kbit_s=rate, bus__requests=way, bus__adapter_us=0.0, bus__nodes=3
-    )
-    simulated_us = modbus_us(rate, 3, read=10, write=4, node_us=50, is_exchange=way == "exchange")
+def modbus(rate: float = 19.2, **changes: Any) -> Profile:
+    changes = {"bus__nodes": 3, "bus__requests": "exchange", **changes}
+    return servo(bus__protocol="modbus-rtu", bus__bit_rate_kbit_s=rate, bus__adapter_us=0.0, **changes)
+
+
+@given(
+    st.sampled_from([9.6, 19.2, 38.4, 115.2]), st.booleans(), st.integers(1, 80), st.integers(1, 80), st.integers(1, 4)
+)
+def test_modbus_is_that_of_the_simulation(rate: float, is_exchange: bool, read: int, write: int, reads: int) -> None:
+    reads = 1 if is_exchange else reads
+    way = "exchange" if is_exchange else "single"
+    profile = modbus(rate, bus__requests=way, bus__reads=reads, payload__read_bytes=read, payload__write_bytes=write)
+    simulated_us = modbus_us(rate, 3, read=read, write=write, node_us=50, is_exchange=is_exchange, reads=reads)
     assert required_us(profile) == pytest.approx(simulated_us, rel=1e-9)
+    drawn_us = sum(event.duration_us for event in busplan.timeline(profile).cycle_events if event.term)
+    assert drawn_us == pytest.approx(simulated_us, rel=1e-9)
+
+
+def test_a_register_of_modbus_has_two_bytes() -> None:
+    # 4 nodes at 19.2 kbit/s: 13 + 4 and 5 + 4 bytes of 11 bits, and 38.5 bits behind each.
+    profile = modbus(payload__read_bytes=3, payload__write_bytes=3, bus__nodes=4, node__execution__base_us=0.0)
+    assert required_us(profile) == pytest.approx(4 * (26 * 11 + 2 * 38.5) / 0.0192)
+
+
+def uncertainty_us(profile: Profile) -> float:
+    (result,) = busplan.capacity(profile, timing_model=["standard"]).results
+    return float(result.uncertainty_us or 0)
+
+
+@pytest.mark.parametrize("share", [-1, 1])
+@pytest.mark.parametrize("protocol", ["modbus-rtu", "dynamixel-2", "feetech", "profibus-dp"])
+def test_uarts_at_the_end_of_their_tolerance_stay_within_u(protocol: str, share: int) -> None:
+    def simulated(rate: float) -> float:
+        if protocol == "profibus-dp":
+            return required_us(profile) * 500 / rate  # all its times are bits
+        if protocol == "modbus-rtu":
+            return modbus_us(rate, 3, read=10, write=4, node_us=50, is_exchange=True)
+        kind = FEETECH if protocol == "feetech" else DYNAMIXEL
+        return servos_us(kind, rate, 14, read=10, write=4, reads=1, is_sync=True, turn_us=50, adapter_us=0)
+
+    rate, tolerance = {"modbus-rtu": (9.6, 0.01), "profibus-dp": (500.0, 0.005)}.get(protocol, (115.2, 0.005))
+    name = "profibus-drives-6" if protocol == "profibus-dp" else "dynamixel-arm-14"
+    changes: dict[str, Any] = {"bus.protocol": protocol, "bus.bit_rate_kbit_s": rate, "bus.adapter_us": 0.0}
+    changes["node.execution.grade"] = "measured"
+    if protocol == "profibus-dp":
+        changes |= {"bus.max_turn_bits": 32.0, "payload.read_bytes": 10, "payload.write_bytes": 10}
+        changes |= {"cycle.nonperiodic_us": 0.0}
+    if protocol == "modbus-rtu":
+        changes |= {"bus.nodes": 3, "bus.requests": "exchange"}
+    profile = busplan.load_profile(name, changes=changes)
+    moved_us = abs(simulated(rate * (1 + share * tolerance)) - simulated(rate))
+    assert moved_us <= uncertainty_us(profile) == pytest.approx(2 / 3**0.5 * moved_us, rel=0.015)
+    # Exact clocks are taken, and a tolerance of the user's own.
+    exact, double = (
+        busplan.load_profile(profile, changes={"bus.clock_tolerance": value}) for value in (0.0, 2 * tolerance)
+    )
+    assert uncertainty_us(exact) < 0.1 * moved_us
+    assert uncertainty_us(double) == pytest.approx(2 * uncertainty_us(profile), rel=0.01)
+
+
+@pytest.mark.parametrize("protocol", ["modbus-rtu", "dynamixel-2", "feetech"])
+def test_a_longest_turn_around_counts_once(protocol: str) -> None:
+    more = {"bus__max_turn_bits": 100.0, "bus__clock_tolerance": 0.0, "node__execution__grade": "measured"}
+    if protocol == "modbus-rtu":
+        profile = modbus(**more)
+        shortest_us, longest_us = (
+            modbus_us(19.2, 3, read=10, write=4, node_us=50 + bits / 0.0192, is_exchange=True) for bits in (0, 100)
+        )
+    else:
+        kind = FEETECH if protocol == "feetech" else DYNAMIXEL
+        profile = servo(bus__protocol=protocol, bus__adapter_us=0.0, bus__requests="single", **more)
+        shortest_us, longest_us = (
+            servos_us(kind, 1000, 14, read=10, write=4, reads=1, is_sync=False, turn_us=50 + bits, adapter_us=0)
+            for bits in (0, 100)
+        )
+    middle_us, u_us = required_us(profile), uncertainty_us(profile)
+    assert middle_us == pytest.approx((shortest_us + longest_us) / 2, rel=1e-9)
+    assert u_us == pytest.approx((longest_us - shortest_us) / 2, rel=1e-4)
 
 
 def test_worldfip_by_hand() -> None:
@@ -205,7 +276,7 @@ def test_a_retry_is_a_request_and_a_timeout() -> None:
 
 def test_a_slave_with_a_shorter_delay_of_its_own() -> None:
     (result,) = busplan.capacity(
-        changed("profibus-drives-6", bus__max_turn_bits=100.0), timing_model=["standard"]
+        changed("profibus-drives-6", bus__max_turn_bits=100.0, bus__clock_tolerance=0.0), timing_model=["standard"]
     ).results
     assert result.uncertainty_us == pytest.approx(6 * (100 - 32) / 2 / 12)
 
@@ -234,6 +305,15 @@ def test_a_protocol_of_the_users_own(tmp_path: Path) -> None:
     assert required_us(path) == by_hand_us
     (derivation,) = busplan.explain(path, "required_us", timing_model="standard").derivations
     assert derivation.value == by_hand_us
+
+
+def test_a_telegram_of_a_protocol_with_words_holds_whole_ones(tmp_path: Path) -> None:
+    path = tmp_path / "words.toml"
+    text = OWN.replace("bits_per_byte = 10\n", "bits_per_byte = 10\nword_bytes = 3\nmax_bytes = 5\n")
+    path.write_text(text, encoding="utf-8")
+    (result,) = busplan.capacity(path, timing_model=["standard"]).results
+    assert result.required_us == 5 * (6 * 20 + 100 + (5 + 6) * 20) + 5 * (6 + 6) * 20
+    assert result.exceeded == ("payload",)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
 """What an EtherCAT machine does wrong is an error of `check --recording`, and what a capture cannot show is said."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -15,6 +17,7 @@ from tests.oracles.ethercat_recording import (
     Datagrams,
     Machine,
     pcapng,
+    planned,
     simulated,
     starts_and_hosts,
     statistics,
@@ -110,6 +113,60 @@ def test_cycles_without_a_frame_are_an_error_and_the_longest_run_is_said(tmp_pat
     assert (figure.recorded, figure.events) == (600, 2000)
     assert figure.note == "600 in a row, 0.601 s without set-points"
     assert codes == {"cycles without a frame": "BP401"}
+
+
+def with_gaps(seed: int) -> tuple[str, Machine]:
+    """A random plan with empty cycles and a machine that keeps it; most masters send nothing in an empty cycle."""
+    random = Random(seed)
+    master = random.choice(("TwinCAT", "TwinCAT", "SOEM", "IgH", "acontis"))
+    rates = random.choice(((2,), (3, 6), (2, 3), (2, 4), (4, 6), (3, 3), (8, 4)))
+    text = plan_of(*((random.randint(1, 6), random.randint(1, 9), every) for every in rates))
+    text = text.replace('"SOEM"', f'"{master}"\nunits = "{random.choice(("spread", "together"))}"')
+    machine = planned(tomllib.loads(text), seed=seed)
+    if random.random() < 0.7:
+        frames = zip(machine.schedule, machine.names, strict=True)
+        machine.schedule = tuple(() if name == " with no group" else of_cycle for of_cycle, name in frames)
+    return text, machine
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_empty_cycles_miss_nothing_wherever_a_capture_begins_and_others_do(seed: int, tmp_path: Path) -> None:
+    plan, machine = with_gaps(seed)
+    turns = len(machine.schedule)
+    filled = [cycle for cycle in range(60, 60 + turns) if machine.names[cycle % turns] != " with no group"]
+    for start in range(turns):
+        for skipped in (frozenset[int](), frozenset({filled[start % len(filled)]})):
+            sent = simulated(replace(machine, skipped=skipped), 150 + start)
+            answer, codes = judged(
+                [packet for packet in sent if packet[0] >= start * machine.period_us], tmp_path, plan=plan
+            )
+            assert recorded(answer, "cycles without a frame") == len(skipped)
+            # TwinCAT's read of the state of all mailboxes is a datagram of its own, as planned.
+            assert "bus.housekeeping_bytes" not in answer.edits
+            assert codes == ({"cycles without a frame": "BP401"} if skipped else {})
+
+
+OF_THREE = cycle(64), cycle(32), ()
+"""Of three cycles the last is empty."""
+THIRDS = plan_of((4, 8, 3), (4, 4, 3))
+
+
+@pytest.mark.parametrize("held", [1, 2, 3])
+def test_a_period_that_a_master_does_not_count_shifts_the_empty_cycles_behind_it(held: int, tmp_path: Path) -> None:
+    # The master holds twice, for some periods, and goes on where it was.
+    once = (*OF_THREE * 30, *OF_THREE[:1], *[()] * held, *OF_THREE[1:])
+    machine = replace(MACHINE, schedule=(*once * 2, *OF_THREE * 30))
+    answer, codes = judged(simulated(machine, len(machine.schedule)), tmp_path, plan=THIRDS)
+    figures = {figure.quantity: figure.events for figure in answer.figures}
+    assert (figures["round trip with g0"], figures["round trip with g1"]) == (92, 92)
+    assert recorded(answer, "cycles without a frame") == 2 * {1: 1, 2: 1, 3: 2}[held]
+    assert codes == {"cycles without a frame": "BP401"}
+
+
+def test_a_cycle_with_less_behind_a_missing_one_is_no_other_cycle(tmp_path: Path) -> None:
+    machine = replace(MACHINE, schedule=(*OF_THREE * 30, cycle(64), (), (), cycle(32), *OF_THREE[1:], *OF_THREE * 30))
+    answer, _ = judged(simulated(machine, len(machine.schedule)), tmp_path, plan=THIRDS)
+    assert recorded(answer, "cycles without a frame") == 2
 
 
 def test_a_cycle_that_lacks_a_frame_or_data_of_most_lacks_one(tmp_path: Path) -> None:

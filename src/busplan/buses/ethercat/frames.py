@@ -118,7 +118,9 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         # The master's datagrams go alone where the first device has no room after them.
         has_room = room - first_bytes - _first_device_bytes(devices) >= 0
         free = choose(has_room, room - first_bytes, 0.0)
-        last = first_bytes + choose(has_room, headers, 0.0)
+        follows, is_filled = choose(has_room, headers, 0.0), total(group.number for group in devices) > 0
+        # Without process data the master's datagrams go alone, without a header of it.
+        last = first_bytes + (follows if is_everywhere(is_filled) else choose(is_filled, follows, 0.0))
         datagrams_bytes = last
         frames = 1
     for group in devices:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from math import ceil
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -48,6 +49,8 @@ _TWO_STAMPS: Final = 0.5
 """Standard uncertainty of the longest of many differences of two stamps, in steps: their error is a step at most."""
 _LEAST_SPAN_BYTES: Final = 200
 """Least range of frame sizes that shows the time of a byte: the host's time depends on the size, too [bytes]."""
+_BITS: Final = 8
+"""Bits of a byte."""
 _STRAY: Final = 0.01
 """Share of the frames that may have a wrong stamp or a wrong partner."""
 
@@ -125,7 +128,9 @@ class _Seen:
         self.delays = line_delays(frames.latches, frames.unlatched)
         self.dropped = frames.notes.dropped + frames.cut
         """Number of packets that the recorder says it dropped, or that it cut."""
-        process = [tuple(part for part in layout if part.is_process_data) for layout in frames.layouts]
+        self.own_reads = _own_reads(network, frames.layouts)
+        """Datagrams of the master itself that have a logical address."""
+        process = [tuple(filter(self._is_process_data, layout)) for layout in frames.layouts]
         datagrams = np.array([_datagrams_bytes(layout) for layout in frames.layouts])
         wire_us = np.array([plain(sending_us(frame_bytes(size))) for size in datagrams.tolist()])
         self.datagrams_bytes, self.wire_us = datagrams[frames.layout], wire_us[frames.layout]
@@ -148,6 +153,9 @@ class _Seen:
         self.master: Quantile | None = None
         self.master_bytes: list[int] | None = None
         """Data of the master's own datagrams, if not as planned [bytes]."""
+
+    def _is_process_data(self, part: Datagram) -> bool:
+        return part.is_logical and part not in self.own_reads
 
     def _why_bad_stamps(self) -> str:
         count = len(self.trips_us)
@@ -351,7 +359,7 @@ class _Seen:
                 for layout in layouts
             ),
         )
-        added = [part for layout in layouts for part in layout if not part.is_process_data]
+        added = [part for layout in layouts for part in layout if not self._is_process_data(part)]
         if sort is cycles.sorts[0] and _datagrams_bytes(added) != plain(housekeeping_bytes(self.network)):
             self.master_bytes = [part.data_bytes for part in added]
 
@@ -456,6 +464,22 @@ def _usual(values: npt.NDArray[Any], sort: Ints) -> npt.NDArray[Any]:
 def _up(us: float) -> float:
     """A time rounded up to a nanosecond, so that it covers what was measured [us]."""
     return ceil(us * 1000) / 1000
+
+
+def _own_reads(network: Network, layouts: Sequence[tuple[Datagram, ...]]) -> frozenset[Datagram]:
+    """Reads of the master's own with a logical address, as of the state of all mailboxes at TwinCAT.
+
+    Such a read (LRD) lies behind process data that bring inputs already, and has a size that the plan gives the
+    master, or at most a bit of each device.
+    """
+    planned, found = network.profile.bus.housekeeping_bytes, set()
+    sizes = range(1, ceil(plain(network.nodes) / _BITS) + 1) if planned is None else planned
+    for layout in layouts:
+        logical = sorted((part for part in layout if part.is_logical), key=attrgetter("address"))
+        names = [COMMANDS[part.command] for part in logical]
+        if names[-1:] == ["LRD"] and {"LRD", "LRW"} & set(names[:-1]) and logical[-1].data_bytes in sizes:
+            found.add(logical[-1])
+    return frozenset(found)
 
 
 def _datagrams_bytes(parts: Sequence[Datagram]) -> float:

@@ -37,6 +37,9 @@ class PlannedCycles:
         self._filled = np.concatenate(([0], np.cumsum(self.data_bytes > 0)))
         filled = np.flatnonzero(self.data_bytes)
         apart = np.diff(filled, append=filled[:1] + len(self.sort)) if len(filled) else np.ones(1, dtype=np.int64)
+        self.apart = np.ones(len(self.sort), dtype=np.int64)
+        """Distance from each cycle with process data to the next, in cycles; 1 for a cycle without."""
+        self.apart[filled] = apart[: len(filled)]
         self.least_apart = int(apart.min())
         """Least distance from a cycle with process data to the next, in cycles."""
         self.least_share = float(np.mean(apart == self.least_apart))
@@ -47,18 +50,21 @@ class PlannedCycles:
         whole, rest = np.divmod(number, len(self.sort))
         return np.asarray(whole * self._filled[-1] + self._filled[rest])
 
-    def phase(self, places: Ints, data_bytes: npt.NDArray[Any]) -> int:
+    def phase(self, places: Ints, data_bytes: npt.NDArray[Any], likely: int = 0) -> int:
         """The cycle of the hyperperiod that period 0 of a recording is: the one with the best match of process data.
 
         Parameters
         ----------
         places, data_bytes
             Periods of n cycles in the recording, from 0, and their process data [bytes].
+        likely
+            The cycle that is taken where no other is better.
         """
         count = len(self.sort)
         pairs, often = np.unique(np.stack((places % count, data_bytes), axis=1), axis=0, return_counts=True)
         planned = self.data_bytes[(pairs[:, :1].astype(np.int64) + np.arange(count)) % count]
-        return int(np.argmax(often @ (planned - np.abs(planned - pairs[:, 1:]))))
+        match = often @ (planned - np.abs(planned - pairs[:, 1:]))
+        return likely if match[likely] >= match.max() else int(np.argmax(match))
 
 
 class SeenCycles(NamedTuple):
@@ -152,15 +158,25 @@ def _starts(times_us: Floats, kinds: Ints, plan: PlannedCycles, period_us: float
 
 
 def _numbered(plan: PlannedCycles, places: Ints, data_bytes: npt.NDArray[Any]) -> tuple[Ints, Ints]:
-    """Cycle of the hyperperiod for each recorded one, and the number of those missing after it, with process data."""
+    """Cycle of the hyperperiod for each recorded one, and the number of those missing after it, with process data.
+
+    The whole recording shows its place in the hyperperiod. A master that skips a period may not skip a number of its
+    own count: where another cycle comes than the next one planned, and data differ, the place is looked for again.
+    """
     count, apart = len(plan.sort), np.diff(places)
-    phase = plan.phase(places, data_bytes)
-    of_plan = (places + phase) % count
-    # A master that skips a period may not skip a number of its own count: find the phase again after each gap.
-    for part in np.split(np.arange(len(places)), np.flatnonzero(apart > plan.least_apart) + 1):
-        if np.any(data_bytes[part] != plan.data_bytes[(places[part] + phase) % count]):
-            phase = plan.phase(places[part], data_bytes[part])
-        of_plan[part] = (places[part] + phase) % count
+    some = max(2 * int(np.count_nonzero(plan.data_bytes)), LEAST_EVENTS)
+    of_plan, looked_at = (places + plan.phase(places, data_bytes)) % count, -1
+    while True:
+        turns = np.append(0, 1 + np.flatnonzero(apart != plan.apart[of_plan[:-1]]))
+        differs = np.logical_or.reduceat(data_bytes != plan.data_bytes[of_plan], turns)
+        for turn in turns[differs & (turns > looked_at)].tolist():
+            phase, part = (of_plan[turn] - places[turn]) % count, slice(turn, turn + some)
+            found = plan.phase(places[part], data_bytes[part], int(phase))
+            if found != phase:
+                of_plan[turn:], looked_at = (places[turn:] + found) % count, turn
+                break
+        else:
+            break
     gaps = plan.filled_before(of_plan[:-1] + apart) - plan.filled_before(of_plan[:-1] + 1)
     return of_plan, gaps
 

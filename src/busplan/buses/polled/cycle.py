@@ -52,6 +52,15 @@ TERMS: Final = (
     ),
     NONPERIODIC,
 )
+_BY_CLOCK: Final = (
+    "cycle_once_us",
+    "cycle_global_us",
+    "cycle_request_us",
+    "cycle_answer_us",
+    "cycle_gap_us",
+    "cycle_retry_us",
+)
+"""Terms that the clocks of the bit rate time, beside the turn-around without the nodes' own time."""
 FIGURES: Final = BusFigures(TERMS, setup=(RATE,), headings=(RATE.key,))
 EVENTS: Final = (
     EventKind("once", "token and GAP", _WIRE, "t", "sync"),
@@ -103,6 +112,12 @@ class PolledCycle(BusCycle):
         is_exact = self.is_typical or between.longest_turn is between.typical_turn
         return between.typical_turn if is_exact else (between.typical_turn + between.longest_turn) / 2
 
+    @property
+    def _clock_tolerance(self) -> Number:
+        """Largest error of the bit rate, a share of it."""
+        given: Number | None = self.network.profile.bus.clock_tolerance
+        return self._protocol.clock_tolerance if given is None else given
+
     def _wire_us(self, size: Number) -> Number:
         """Time of a telegram of a size [us]."""
         us: Number = size * self._protocol.bits_per_byte * 1000 / self.network.profile.bus.bit_rate_kbit_s
@@ -141,7 +156,7 @@ class PolledCycle(BusCycle):
     def _longest_us(self, group: Group) -> Number:
         protocol = self._protocol
         if self.way == "exchange":
-            return self._wire_us(protocol.exchange_request_bytes + group.write_bytes)
+            return self._wire_us(protocol.exchange_request_bytes + protocol.data_bytes(group.write_bytes))
         if self.way == "sync":
             return self._wire_us(protocol.sync_read_bytes + group.nodes * protocol.sync_node_bytes)
         written = protocol.write_request_bytes + self._data("write", group)
@@ -155,7 +170,7 @@ class PolledCycle(BusCycle):
     def _data(self, kind: TransactionKind, group: Group) -> Number:
         """Mean data of a request of a node [bytes]."""
         size = group.read_bytes if kind == "read" else group.write_bytes
-        return size / self._times_a_cycle(kind)
+        return self._protocol.data_bytes(size, self._times_a_cycle(kind))
 
     def _execution_us(self, kind: str, group: Group) -> Number:
         """Own time of a node before it answers; 0 where it answers from a buffer [us]."""
@@ -187,8 +202,8 @@ class PolledCycle(BusCycle):
         """A request for each node."""
         protocol, rounds = self._protocol, group.nodes
         if kind == "exchange":
-            request: Number = protocol.exchange_request_bytes + group.write_bytes
-            answer: Number = protocol.exchange_answer_bytes + group.read_bytes
+            request: Number = protocol.exchange_request_bytes + protocol.data_bytes(group.write_bytes)
+            answer: Number = protocol.exchange_answer_bytes + protocol.data_bytes(group.read_bytes)
         elif kind == "read":
             request, answer = protocol.read_request_bytes, protocol.read_answer_bytes + self._data(kind, group)
             rounds = rounds * self._times_a_cycle(kind)
@@ -225,12 +240,17 @@ class PolledCycle(BusCycle):
         return group.nodes * self._times_a_cycle("write") if is_answered else 0
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """Turn-around, of all nodes together; the adapter; and the nodes' own time."""
+        """Turn-around and clocks, of all nodes together; the adapter; and the nodes' own time.
+
+        The clocks of master and nodes count as one: a divider errs alike in all UARTs of a type.
+        """
         groups, between = self.network.groups, self._times
         answers = total(self._answers(group, kind) for group in groups for kind in TRANSACTION_KINDS)
         half_us = 0.0 if self.is_typical else (between.longest_turn - between.typical_turn) / 2
+        timed_us = total((*(self.by_term[key] for key in _BY_CLOCK), answers * self._turn_us))
         doubts = [
             Doubt("bus.max_turn_bits", "turn-around of a node", answers * half_us / 2),
+            Doubt("bus.clock_tolerance", "clocks of the bit rate", timed_us * self._clock_tolerance / 3**0.5),
             Doubt("bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * ADAPTER_SHARE),
         ]
         if self.network.profile.bus.protocol not in BUFFERED:

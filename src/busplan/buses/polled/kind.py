@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import reduce
+from itertools import chain
 from typing import ClassVar, Final
 
 from busplan.buses.bus import Bus
@@ -33,16 +34,13 @@ _RATES_KBIT_S: Final = {
 
 def _largest_bytes(network: Network) -> Number:
     """The most data of a telegram for one node [bytes]."""
-    bus = network.profile.bus
-    return reduce(
-        larger,
-        (
-            larger(group.read_bytes / bus.reads, group.write_bytes / bus.writes)
-            if PolledCycle(network, STANDARD).way != "exchange"
-            else larger(group.read_bytes, group.write_bytes)
-            for group in network.groups
-        ),
+    bus, protocol = network.profile.bus, protocol_of(network.profile.bus)
+    reads, writes = (1, 1) if PolledCycle(network, STANDARD).way == "exchange" else (bus.reads, bus.writes)
+    sizes = (
+        (protocol.most_data_bytes(group.read_bytes, reads), protocol.most_data_bytes(group.write_bytes, writes))
+        for group in network.groups
     )
+    return reduce(larger, chain.from_iterable(sizes))
 
 
 LIMITS: Final = (
@@ -140,6 +138,7 @@ class Polled(Bus):
         "bus.bit_rate_kbit_s": Key("f", meaning="in every node"),
         "bus.requests": Key(chooses=True, meaning="if the host's software can"),
         "bus.return_delay_us": Key("t_delay", meaning="in every node"),
+        "bus.clock_tolerance": Key("df"),
         "bus.adapter_us": Key("t_adapter", grade="assumed"),
         "bus.host_us": Key("t_host", role="host"),
         "node.execution.worst_extra_us": Key("T_extra"),

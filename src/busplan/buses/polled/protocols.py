@@ -5,13 +5,14 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from pydantic import Field
 
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, total
+from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, rounded_up, total
 from busplan.sections.base import Bytes, Count, Section, TimeUs
 from busplan.sourced import Constants
 
 CONSTANTS: Final = Constants("busplan.buses.polled")
 """Constants with a source, by their names here."""
 ADAPTER_SHARE: Final = CONSTANTS["SHARES[ADAPTER_SHARE]"]
+CLOCK_TOLERANCE: Final = CONSTANTS["SHARES[CLOCK_TOLERANCE]"]
 MAX_DELAY_BITS: Final = CONSTANTS.by_key("MAX_DELAY_BITS")
 SLOT_BITS: Final = CONSTANTS.by_key("SLOT_BITS")
 SETUP_BITS: Final = CONSTANTS.by_key("SETUP_BITS")
@@ -22,12 +23,18 @@ _RATE_STEPS_KBIT_S: Final = (187.5, 500, 1500, 3000, 6000)
 ProtocolName = Literal["profibus-dp", "modbus-rtu", "dynamixel-2", "feetech", "worldfip"]
 Requests = Literal["exchange", "sync", "single"]
 BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+Tolerance = Annotated[float, Field(ge=0, le=0.05, allow_inf_nan=False)]
 
 
 class Protocol(Section):
     """Section [bus.protocol]: a serial protocol of the user's own; a size is without data, 0 for no such telegram."""
 
     bits_per_byte: Annotated[float, Field(ge=8, le=12)] = Field(description="Bits of a byte on the wire", examples=[10])
+    word_bytes: Annotated[int, Field(ge=1, le=64)] = Field(
+        default=1,
+        description="Data of a telegram are whole words of this size, as registers of Modbus [bytes]",
+        examples=[2],
+    )
     read_request_bytes: Bytes = Field(default=0, description="Request to read one node [bytes]", examples=[8])
     read_answer_bytes: Bytes = Field(default=0, description="Answer to it, without its data [bytes]", examples=[6])
     write_request_bytes: Bytes = Field(
@@ -50,6 +57,14 @@ class Protocol(Section):
     silence_us: TimeUs = Field(default=0.0, description="Least of that silence [us]", examples=[1750])
     min_turn_bits: BitTimes = Field(default=0.0, description="Shortest wait for an answer [bits]", examples=[10])
     max_turn_bits: BitTimes = Field(default=0.0, description="Longest wait for an answer [bits]", examples=[70])
+    master_turns: bool = Field(
+        default=False,
+        description="Whether the master waits for max_turn_bits, too, before its next telegram, as in WorldFIP",
+        examples=[True],
+    )
+    clock_tolerance: Tolerance = Field(
+        default=CLOCK_TOLERANCE, description="Largest error of the bit rate, a share of it", examples=[0.01]
+    )
     return_delay_us: TimeUs = Field(
         default=0.0, description="Delay of an answer that is set in a new node [us]", examples=[500]
     )
@@ -68,6 +83,16 @@ class Protocol(Section):
             "single": self.read_request_bytes,
         }
         return tuple(way for way, size in ways.items() if not is_everywhere(size <= 0))
+
+    def data_bytes(self, size: Number, requests: Number = 1) -> Number:
+        """Data of a telegram where some share data of a size: whole words, the mean of the telegrams [bytes]."""
+        if not is_everywhere(self.word_bytes <= 1):
+            size = rounded_up(size / self.word_bytes) * self.word_bytes
+        return size / requests
+
+    def most_data_bytes(self, size: Number, requests: Number) -> Number:
+        """The same of the largest of these telegrams [bytes]."""
+        return rounded_up(size / (self.word_bytes * requests)) * self.word_bytes
 
 
 def _shipped(name: str) -> Protocol:
@@ -124,7 +149,7 @@ def times(network: Network) -> Times:
     longest_us = shortest_us
     if not is_off(most_bits):
         longest_us = larger(silence_us + most_bits * bit_us + delay_us, shortest_us)
-    after_us = silence_us + _bits_us(most_bits, bit_us)
+    after_us = silence_us + (_bits_us(most_bits, bit_us) if protocol.master_turns else 0.0)
     # An arbiter waits once more before it answers a request of its own.
     silent_us = after_us * (2 if bus.protocol == "worldfip" else 1)
     return Times(0.0, shortest_us, longest_us, after_us, silent_us, 0.0, bus.timeout_us or 0.0)

@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Discriminator, Field, Tag
 
 from busplan.buses.polled.cycle import STANDARD, TimingModelName
-from busplan.buses.polled.protocols import BitTimes, Protocol, ProtocolName, Requests, protocol_of
+from busplan.buses.polled.protocols import BitTimes, Protocol, ProtocolName, Requests, Tolerance, protocol_of
 from busplan.sections.base import Count, Problem, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
@@ -48,9 +48,15 @@ class PolledBus(BusSection):
     )
     max_turn_bits: BitTimes | None = Field(
         default=None,
-        description="Longest wait for an answer, as max T_SDR of the slowest slave's GSD. Without it the protocol's "
-        "[bits]",
+        description="Longest wait for an answer, as max T_SDR of the slowest slave's GSD; beside silence, return delay "
+        "and node.execution. Without it the protocol's [bits]",
         examples=[100],
+    )
+    clock_tolerance: Tolerance | None = Field(
+        default=None,
+        description="How much longer or shorter than they should be all bits may be, a share 0..0.05: a doubt of the "
+        "cycle; 0 for exact clocks. Without it the protocol's: 0.01 of modbus-rtu, else 0.005, assumed",
+        examples=[0.0001],
     )
     adapter_us: TimeUs = Field(
         default=0.0,
