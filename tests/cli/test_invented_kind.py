@@ -20,7 +20,7 @@ from pydantic import Field
 import busplan
 from busplan.buses import kind_names, registered
 from busplan.buses.bus import Bus
-from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt
 from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import (

@@ -50,7 +50,6 @@ MEASURED_DELAY_UNCERTAINTY_US: Final = CONSTANTS.computed("MEASURED_DELAY_UNCERT
 _PER_BYTE: Final = Spread.of([row["published"] for row in rows_of("ethercat", "bytes")])
 BYTE_BIAS_US: Final = CONSTANTS.computed("BYTE_BIAS_US", _PER_BYTE.mean - BYTE_US)
 BYTE_BIAS_UNCERTAINTY_US: Final = CONSTANTS.computed("BYTE_BIAS_UNCERTAINTY_US", _PER_BYTE.uncertainty)
-UNMEASURED_MASTER_SHARE: Final = CONSTANTS["UNMEASURED_MASTER_SHARE"]
 HOUSEKEEPING_BYTES: Final = CONSTANTS.by_key("HOUSEKEEPING_BYTES")
 """Datagrams that each master adds to the first frame of every cycle, without that of distributed clocks."""
 CLOCK_BYTES: Final = CONSTANTS.by_key("CLOCK_BYTES")

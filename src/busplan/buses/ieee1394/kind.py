@@ -190,7 +190,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         profile = network.profile
         paper_has_not = {
             "bus.speed": not has_gaps(network),
-            "bus.cycle_master": profile.bus.cycle_master,
+            "bus.cycle_master": profile.bus.cycle_master and "cycle_master" in profile.bus.model_fields_set,
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
             "bus.charge_hops": profile.bus.charge_hops != "farthest",
             "cycle.schedule": profile.cycle.schedule != "individual",
