@@ -143,14 +143,10 @@ class Premise(NamedTuple):
 
 
 SHARED_PREMISES: Final = (
-    Premise("node.execution.worst_extra_us", "no slower execution", 5.0, lambda cycle: _executes(cycle)),
+    Premise("node.execution.worst_extra_us", "no slower execution", 5.0, lambda cycle: cycle.executes),
     Premise("cycle.nonperiodic_us", "no other traffic", 10.0, lambda cycle: bool(cycle.network.groups)),
 )
-"""Rows that every kind with a cycle has."""
-
-
-def _executes(cycle: "BusCycle") -> bool:
-    return cycle.network.bus.has_execution(cycle.network, of_latency=True)
+"""Rows that every kind has."""
 
 
 class BusLatency(NamedTuple):
@@ -280,6 +276,11 @@ class BusCycle(ABC):
     def doubts(self) -> tuple[Doubt, ...]:
         """Inputs that are not known exactly; different ones are independent."""
         return ()
+
+    @property
+    def executes(self) -> bool:
+        """Whether the time that a node takes plays a part in any figure."""
+        return True
 
     def rests_on(self) -> tuple[RestsOn, ...]:
         """What the profile does not give and is taken for granted; what matters most first."""

@@ -93,6 +93,8 @@ PREMISES: Final = (
     Premise("bus.sync_jitter_us", "SYNC without jitter", 50.0, lambda cycle: cycle.traffic.has_sync),
     Premise("bus.clock_tolerance", "exact clocks", 1e-4),
     Premise("bus.host_us", "an instant host", 100.0, lambda cycle: cycle.waits_for_host),
+    Premise("bus.sync_counter", "SYNC without counter", True, lambda cycle: cycle.traffic.has_sync),
+    Premise("bus.sync_identifier", "SYNC by its usual identifier", 0x700, lambda cycle: cycle.traffic.has_sync),
     Premise("message", "no other messages"),
     Premise("message.jitter_us", "messages without jitter", 100.0),
 )

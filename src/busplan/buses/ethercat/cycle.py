@@ -79,6 +79,10 @@ PREMISES: Final = (
     Premise("bus.master_jitter_us", "no jitter of the master", 20.0),
     Premise("bus.mailbox_polls", "no mailbox polls", 1),
     Premise("node.cable_length_m", "no length of cables", 10.0),
+    Premise("node.delay_us", "usual delays of devices"),
+    Premise("bus.master", "the frames of a usual master"),
+    Premise("bus.process_data", "the frames of a usual master"),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2),
 )
 
 

@@ -75,6 +75,8 @@ PREMISES: Final = (
     Premise("host.transaction_us", "an instant host", 10.0),
     Premise("cycle.retries", "no busy retries", 1),
     Premise("bus.isochronous_us", "no isochronous traffic", 20.0, lambda cycle: cycle.network.profile.bus.cycle_master),
+    Premise("bus.phy_delay_us", "PHYs of 14 ticks", 0.144),
+    Premise("bus.max_hops", "a chain of cables", 63),
 )
 
 
@@ -219,6 +221,11 @@ class CycleWithStarts(BusCycle):
     def published_nodes(self) -> Number | None:
         """Number of nodes by equation (11) [1]; None where the paper has none for this schedule or these nodes."""
         return None
+
+    @property
+    def executes(self) -> bool:
+        """Other answers than split ones, and broadcasts, keep the execution off the bus."""
+        return self.network.bus.has_execution(self.network)
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""

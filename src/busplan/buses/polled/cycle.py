@@ -84,8 +84,11 @@ STRETCHES: Final = (
 
 PREMISES: Final = (
     Premise("bus.host_us", "an instant host", 100.0),
-    Premise("bus.adapter_us", "no adapter", 1000.0, lambda cycle: cycle.network.profile.bus.protocol not in BUFFERED),
+    Premise("bus.adapter_us", "no adapter", 1000.0),
     Premise("bus.retries", "no repeated requests", 1),
+    Premise("bus.max_turn_bits", "answers as the protocol says"),
+    Premise("bus.reads", "one read a node", 2),
+    Premise("bus.writes", "one write a node", 2),
     Premise("", "no stuffed bytes", applies=lambda cycle: cycle.network.profile.bus.protocol == "dynamixel-2"),
 )
 

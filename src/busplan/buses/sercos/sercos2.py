@@ -151,7 +151,13 @@ STRETCHES: Final = (
 """Stretches that several events make together."""
 
 
-PREMISES: Final = (Premise("bus.recovery_us", "no recovery after the MDT", 50.0),)
+PREMISES: Final = (
+    Premise("bus.recovery_us", "no recovery after the MDT", 50.0),
+    Premise("bus.at_start_us", "the first AT as early as it can be"),
+    Premise("bus.turnaround_us", "the published turn-around"),
+    Premise("bus.at_gap_us", "the usual gap between drives"),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2),
+)
 
 
 class Sercos2Cycle(SercosCycle):

@@ -57,7 +57,15 @@ STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT
 """Stretches that several events make together."""
 
 
-PREMISES: Final = (Premise("bus.at_start_us", "no least time before the AT", 50.0),)
+PREMISES: Final = (
+    Premise("bus.at_start_us", "no least time before the AT", 50.0),
+    Premise("bus.device_delay_us", "published delays"),
+    Premise("bus.component_delay_us", "published delays"),
+    Premise("bus.master_delay_us", "a published master"),
+    Premise("bus.master_jitter_us", "a published master"),
+    Premise("bus.gap_bytes", "the usual gap between telegrams"),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2),
+)
 
 
 class Sercos3Cycle(SercosCycle):
