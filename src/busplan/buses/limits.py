@@ -224,12 +224,15 @@ class Starter(NamedTuple):
     @property
     def execution(self) -> str:
         """Keys of a node's execution time, which is assumed."""
-        return self.table or f"""\
+        return (
+            self.table
+            or f"""\
 kind = "linear"
 grade = "assumed"          # between nothing and twice its value
 base_us = 20               # assumed: {self.base}
 per_byte_us = 0.1          # assumed: what each byte adds
 """
+        )
 
     def section(self, host: str | None = None, variant: str = "") -> str:
         """Section [bus] with the lines of a host, by default of `host`, and those of a variant, or its own section."""

@@ -59,7 +59,7 @@ def plan_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 @pytest.mark.parametrize("form", ["table", "markdown", "html"])
 def test_the_card_says_what_it_rests_on_in_every_form(run: Run, plan_file: Path, form: str) -> None:
     said = run("capacity", plan_file.name, "--format", form, cwd=plan_file.parent).stdout.replace("\\", "")
-    assert "priority queues: assumed; no repeated frames" in said
+    assert "no repeated frames, priority queues and 4 more" in said
     assert "bus.bit_rate_kbit_s: measure it first" in said
 
 

@@ -106,7 +106,9 @@ def worse(kind: str, variant: str) -> Mapping[str, tuple[object, str]]:
                     after = worth(busplan.load_profile(profile, changes={key: value}))
                 except (BusplanError, ValueError):
                     continue
-                names = [name for name in before if after.get(name, -inf) > before[name] + 1e-9 * (1 + abs(before[name]))]
+                names = [
+                    name for name in before if after.get(name, -inf) > before[name] + 1e-9 * (1 + abs(before[name]))
+                ]
                 if names:
                     found[key] = value, names[0]
                     break

@@ -12,7 +12,6 @@ from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, MOST_REPEAT
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
-    NOT_BY_PRIORITY,
     REPEATED,
     SYNC,
     Message,
@@ -57,7 +56,6 @@ from busplan.elementwise import (
     value_of,
     within,
 )
-from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]

@@ -22,7 +22,6 @@ from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delay
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     GroupHops,
-    answers_split,
     charges_own_hops,
     events,
     exchange,
