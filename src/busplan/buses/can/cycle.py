@@ -478,6 +478,17 @@ class CanCycle(BusCycle):
             return choose(left >= 0, 0.0, inf)
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
+    def _queues(self) -> str:
+        """Orders of queues that the profile gives, and the senders, so that a misspelt one is seen; else empty."""
+        bus = self.network.profile.bus
+        orders = {group.node.queue or bus.queue for group in self.network.groups} | {bus.queue}
+        known = sorted(order for order in orders if order is not None)
+        words = " and ".join(known)
+        if any(order in NOT_BY_PRIORITY for order in known):
+            senders = dict.fromkeys(message.sender for message in self.network.profile.message if message.sender)
+            words += f" (senders {first_of(list(senders), 8)})" if senders else ""
+        return words
+
     def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:
         """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
         most = self.network.profile.most_load
@@ -486,6 +497,8 @@ class CanCycle(BusCycle):
             fullest = self._in_cycle_us / self.traffic.period_us + self._messages_load
             words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
         lines = [("load", words)]
+        if queues := self._queues():
+            lines.append(("queues", queues))
         if self._messages:
             answers = message_responses(self.traffic.longest)
             latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)

@@ -143,7 +143,7 @@ class Ieee1394(Bus):
 kind = "ieee1394"
 speed = "S400"             # assumed: the slowest port on the way decides, S100, S200 or S400
 gap_count = "optimal"      # assumed: the smallest safe one; the bus manager must write it, until then it is 63
-cycle_master = true        # assumed: an OHCI host sends cycle starts, unless its software stops them (Linux, ohci.c)""",
+cycle_master = true        # assumed: an OHCI host sends cycle starts unless its software stops them (Linux, ohci.c)""",
         slice_ratio="0.8          # assumed: the share for communication; the rest is for the host's own work",
         measure="measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv{group} --apply",
         table="""\
