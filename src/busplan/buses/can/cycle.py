@@ -12,6 +12,7 @@ from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, MOST_REPEAT
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
+    NOT_BY_PRIORITY,
     REPEATED,
     SYNC,
     Message,
@@ -56,6 +57,7 @@ from busplan.elementwise import (
     value_of,
     within,
 )
+from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]

@@ -138,7 +138,7 @@ def _state(row: Figure, values: Mapping[str, Any]) -> State:
 
 def _rests_on_table(verdict: Verdict) -> Table:
     """What the profile does not give and the verdict takes for granted."""
-    rows = (TableRow((part.words, Code(part.key) if part.key else "none"), is_detail=True) for part in verdict.rests_on)
+    rows = (TableRow((part.words, Code(part.key) if part.key else "none")) for part in verdict.rests_on)
     columns = TableColumn("taken", kind="words"), TableColumn("key that gives it", kind="words")
     return Table(columns, tuple(rows), Sentence(("What the verdict rests on, as the profile does not give it",)))
 
