@@ -120,7 +120,7 @@ def test_a_plan_that_fails_has_no_margin_in_repeated_frames(run: Run, plan_file:
     )
     done = run("capacity", plan_file.name, *changes, cwd=plan_file.parent)
     assert "FIT" in done.stdout
-    assert "repeated frames  " not in done.stdout
+    assert "\n  repeated frames" not in done.stdout
     assert "up to" not in done.stdout
 
 

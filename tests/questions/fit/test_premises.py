@@ -119,3 +119,16 @@ def worse(kind: str, variant: str) -> Mapping[str, tuple[object, str]]:
 def test_what_is_not_given_and_makes_a_plan_worse_is_said(kind: str, variant: str) -> None:
     said = {part.key for part in deciding_cycle(network_of(new_profile(kind, variant))).rests_on()}
     assert {key: why for key, why in worse(kind, variant).items() if key not in said} == {}
+
+
+@pytest.mark.parametrize("kind", ["ieee1394", "can", "polled"])
+@pytest.mark.parametrize("period_us", [3000.0, 5000.0, 8000.0, 12_000.0, 20_000.0])
+def test_a_verdict_on_a_guess_holds_at_twice_the_guess(kind: str, period_us: float) -> None:
+    profile = busplan.load_profile(new_profile(kind, ""), changes={"cycle.period_us": period_us, "limits.reserve": 0.0})
+    execution = profile.node.execution
+    names = ("time_us",) if execution.kind == "table" else ("base_us", "per_byte_us")
+    values = {f"node.execution.{name}": getattr(execution, name) for name in names}
+    twice = {key: [2 * one for one in us] if isinstance(us, tuple) else 2 * us for key, us in values.items()}
+    doubled = busplan.load_profile(profile, changes=twice)
+    (found, *_), (then, *_) = busplan.capacity(profile).results, busplan.capacity(doubled).results
+    assert found.verdict != "fits" or then.fits
