@@ -89,7 +89,7 @@ def test_a_late_sync_reaches_the_circle_and_the_timeline(tmp_path: Path) -> None
         (
             "sync_jitter_us = 0",
             'access = "polled"\npipeline_cycles = 0',
-            "10:1: bus.pipeline_cycles = 0: is 0 without SYNC",
+            "10:1: bus.pipeline_cycles = 0: asks for SYNC",
         ),
     ],
 )

@@ -101,7 +101,7 @@ PREMISES: Final = (
 
 
 class CanCycle(BusCycle):
-    """SYNC's jitter, SYNC, the wait for the slowest node, all feedback PDOs, the host, all command PDOs, and the window.
+    """SYNC's jitter, SYNC, the wait for the slowest node, feedback PDOs, the host, command PDOs, and the window.
 
     A network of messages alone has no cycle: then no term takes time, and only loads and response times are there.
 

@@ -90,7 +90,7 @@ class CanBus(BusSection):
     )
     sync_jitter_us: TimeUs = Field(
         default=0.0,
-        description="How late the host may send SYNC, under the period: the cycle ends so much before the next one [us]",
+        description="How late the host may send SYNC, under the period: the cycle ends so much sooner [us]",
         examples=[50],
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
@@ -388,7 +388,7 @@ class CanProfile(Profile):
             keys.append("bus.pipeline_cycles")
         none = f'and bus.access = "{bus.access}" has none'
         words = {
-            "pipeline_cycles": "is 0 without SYNC, where a command rests on an earlier cycle's answers; write 1 or more",
+            "pipeline_cycles": "asks for SYNC: without it a command rests on an earlier cycle; write 1 or more",
             "queue": f"is computed with SYNC alone, {none}; remove it, and by priority is assumed",
             "update": f"asks for SYNC, {none}; say on_arrival",
         }

@@ -369,11 +369,11 @@ class _Start(NamedTuple):
 def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
     """Where a busy period of a message may begin: it has the worst of these.
 
-    SYNC comes once a period, sooner by its jitter, and feedback and commands behind it. So a busy period that begins with SYNC meets each
-    once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
-    that follows it sooner than a period later. Behind messages of their queue, and without SYNC, these may be as late
-    as the end of the cycle; SYNC behind such messages begins no other busy period, for all that is before it then is
-    sent in this cycle.
+    SYNC comes once a period, sooner by its jitter, and feedback and commands behind it. So a busy period that begins
+    with SYNC meets each once a period. One that begins with late feedback, or with late commands, meets these, and the
+    next SYNC with all that follows it sooner than a period later. Behind messages of their queue, and without SYNC,
+    these may be as late as the end of the cycle; SYNC behind such messages begins no other busy period, for all that is
+    before it then is sent in this cycle.
     """
     if not traffic.has_cycle:
         return [_Start()]
