@@ -472,7 +472,8 @@ def _own_reads(network: Network, layouts: Sequence[tuple[Datagram, ...]]) -> fro
     Such a read (LRD) lies behind process data that bring inputs already, and has a size that the plan gives the
     master, or at most a bit of each device.
     """
-    planned, found = network.profile.bus.housekeeping_bytes, set()
+    found: set[Datagram] = set()
+    planned: Sequence[int] | None = network.profile.bus.housekeeping_bytes
     sizes = range(1, ceil(plain(network.nodes) / _BITS) + 1) if planned is None else planned
     for layout in layouts:
         logical = sorted((part for part in layout if part.is_logical), key=attrgetter("address"))
