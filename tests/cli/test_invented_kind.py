@@ -20,7 +20,7 @@ from pydantic import Field
 import busplan
 from busplan.buses import kind_names, registered
 from busplan.buses.bus import Bus
-from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise
 from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import (
@@ -366,7 +366,6 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     said = run("capacity", ring.name, cwd=ring.parent).stdout
     assert "\n  free            100 us\n" in said
     assert "\n  bias            none corrected, no uncertainty given: how far the bus is from this" in said
-    assert "\n  not included" not in said
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1200"), encoding="utf-8")
     assert "no bias or uncertainty known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
     rows = list(csv.DictReader(StringIO(run("capacity", ring.name, "--format", "csv", cwd=ring.parent).stdout)))
@@ -380,8 +379,7 @@ class DoubtedCycle(RingCycle):
         data, *_ = self.terms
         return (Doubt("bus.rate_mbit_s", "rate", 0.01 * data.us), Doubt("bus.token_us", "token", 0.5 * self.rounds))
 
-    def left_out(self) -> tuple[LeftOut, ...]:
-        return (LeftOut("guard time", "guard.guard_us"),) if not self.network.profile.guard.guard_us else ()
+    premises = (Premise("guard.guard_us", "no guard time", 10.0),)
 
 
 class DoubtedRing(Ring):
@@ -425,7 +423,7 @@ def test_doubts_without_a_bias_make_three_verdicts(
     assert "us, +/- 13\n" in said
     assert "\n  largest doubt   rate, 98 % of the variance\n" in said  # 6.4 squared of 41.96
     assert "\n  bias            none corrected: how far the bus is from this timing model is not known\n" in said
-    assert "\n  not included    guard time\n" in said
+    assert "\n  rests on        no guard time, no slower execution, no other traffic\n" in said
     done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
     assert done.returncode == code
     codes = {"not shown to fit": {"BP114"}, "does not fit": {"BP101"}, "fits": set()}

@@ -12,6 +12,7 @@ import busplan
 Run = Callable[..., Any]
 
 TEXT = (Path(__file__).parents[2] / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
+TEXT = "".join(line for line in TEXT.splitlines(keepends=True) if not line.startswith("cycle_master"))
 BEYOND = {
     "bus.cycle_master": ("[bus]", "cycle_master = true"),
     "bus.phy_delay_us": ("[bus]", "phy_delay_us = 0.144"),

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import chain
-from typing import ClassVar, Final, Literal, NamedTuple, TypeAlias
+from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.buses.figure import REQUIRED, Figure, term_name
 from busplan.buses.network import Group, Network, Rate
@@ -121,12 +121,32 @@ class Doubt(NamedTuple):
     """Standard uncertainty of the cycle due to this input: that of the input times the sensitivity [us]."""
 
 
-class LeftOut(NamedTuple):
-    """A part of the cycle that the profile does not give: no verdict counts it."""
+class RestsOn(NamedTuple):
+    """What a verdict takes for granted because the profile does not give it."""
 
-    label: str
     key: str
-    """The key that would give it."""
+    """Dotted key that would give it; empty where no key does."""
+    words: str
+    """What is taken instead, in a few words."""
+
+
+class Premise(NamedTuple):
+    """A row of a kind's table of what is taken for granted while the profile does not give it."""
+
+    key: str
+    """Dotted key, with "node" for each group; empty where no key gives it."""
+    words: str
+    usual: object = None
+    """A value that a machine usually has, valid in a new profile."""
+    applies: Callable[[Any], bool] = lambda cycle: True  # noqa: ARG005 - of every cycle
+    """Whether it plays a part in a cycle of plain numbers."""
+
+
+SHARED_PREMISES: Final = (
+    Premise("node.execution.worst_extra_us", "no slower execution", 5.0, lambda cycle: cycle.executes),
+    Premise("cycle.nonperiodic_us", "no other traffic", 10.0, lambda cycle: bool(cycle.network.groups)),
+)
+"""Rows that every kind has."""
 
 
 class BusLatency(NamedTuple):
@@ -157,6 +177,8 @@ class BusCycle(ABC):
     """Which cycle of the hyperperiod (the common multiple of the rates) it is, from 1; None for that of the verdict."""
     term_figures: ClassVar[tuple[Figure, ...]]
     """One for each term, in their order."""
+    premises: ClassVar[tuple[Premise, ...]] = ()
+    """Table of the kind: what is taken for granted while a profile does not give it, what matters most first."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
     """Transaction and kind of the events that bring a node its command, complete at the end of the last; empty if it is
     complete at the end of the cycle. Events without a node bring the command of all."""
@@ -255,13 +277,30 @@ class BusCycle(ABC):
         """Inputs that are not known exactly; different ones are independent."""
         return ()
 
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """Parts of the cycle that the profile does not give, each with its key."""
-        return ()
+    @property
+    def executes(self) -> bool:
+        """Whether the time that a node takes plays a part in any figure."""
+        return True
 
-    def premises(self) -> tuple[str, ...]:
-        """Properties of the bus that all figures rest on and no key gives, in words."""
-        return ()
+    def rests_on(self) -> tuple[RestsOn, ...]:
+        """What the profile does not give and is taken for granted; what matters most first."""
+        return tuple(
+            RestsOn(key, premise.words)
+            for premise in (*self.premises, *SHARED_PREMISES)
+            if premise.applies(self)
+            for key in self._not_given(premise.key)
+        )
+
+    def _not_given(self, key: str) -> Iterator[str]:
+        """Dotted keys behind a key of the table that the profile does not give, of each group; not even as 0."""
+        section, _, name = key.partition(".")
+        if section == "node":
+            yield from (group.key(name) for group in self.network.groups if not _is_given(group.node, name))
+        elif section == "message" and name:
+            messages = self.network.profile.message
+            yield from (f"message.{one.name}.{name}" for one in messages if not _is_given(one, name))
+        elif not key or not _is_given(self.network.profile, key):
+            yield key
 
     def events(self) -> Iterator[BusEvent]:
         """All events of the cycle, one by one; of plain numbers."""
@@ -331,6 +370,14 @@ class BusCycle(ABC):
         """The latencies; a kind without transactions has one, the cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
         return (BusLatency("cycle", None, phases),)
+
+
+def _is_given(section: Any, key: str) -> bool:
+    """Whether a key stands in the profile."""
+    *outer, name = key.split(".")
+    for part in outer:
+        section = getattr(section, part)
+    return section is not None and name in section.model_fields_set
 
 
 def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:

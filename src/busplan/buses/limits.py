@@ -225,8 +225,23 @@ class Starter(NamedTuple):
     """Key of [bus] with a bit rate that a user is asked for; empty where there is one alone."""
     base: str = "what a node does in each cycle"
     """Meaning of execution.base_us."""
+    table: str = ""
+    """Keys of an execution time that was published, in place of a guess."""
     more: str = ""
     """Commented lines at the end of the profile."""
+
+    @property
+    def execution(self) -> str:
+        """Keys of a node's execution time, which is assumed."""
+        return (
+            self.table
+            or f"""\
+kind = "linear"
+grade = "assumed"          # between nothing and twice its value
+base_us = 20               # assumed: {self.base}
+per_byte_us = 0.1          # assumed: what each byte adds
+"""
+        )
 
     def section(self, host: str | None = None, variant: str = "") -> str:
         """Section [bus] with the lines of a host, by default of `host`, and those of a variant, or its own section."""

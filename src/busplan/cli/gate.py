@@ -198,6 +198,7 @@ def check_command(
     if verbose:
         say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
         say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
+        say(*(f"{file.path}: rests on {words}" for file in report.files if (words := file.rests_on_words)))
     say(*(line for file in report.files for line in _suppressed_lines(file) if show_suppressed))
     if updated is not None:
         _update_baseline(updated, collection.sources, report, quiet=quiet)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final, Literal, NamedTuple
 
+from busplan.buses.cycle import RestsOn
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.gate.baseline import Record, figures_of, keys_of, known_as, regression
@@ -33,6 +34,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Document, LoadedProfile, Spot, decode, read_bytes, validate
 from busplan.profile.kinds import path_of
 from busplan.profile.sources import ProfileSource
+from busplan.questions.fit.certainty import deciding_cycle
 from busplan.sourced import constants_changed
 
 MARK: Final = "busplan:"
@@ -131,6 +133,8 @@ class Fit(NamedTuple):
     """Time left in the slice, corrected for the bias [us]."""
     uncertainty_us: float | None = None
     """Expanded uncertainty of the corrected margin [us]."""
+    rests_on: tuple[RestsOn, ...] = ()
+    """What the profile does not give and the verdict takes for granted."""
 
 
 class Suppressed(NamedTuple):
@@ -165,6 +169,11 @@ class FileResult(NamedTuple):
     """Findings that a comment, the selection of rules or the baseline suppresses."""
     mended: tuple[str, ...] = ()
     """Findings that the baseline knows, and that are no more."""
+
+    @property
+    def rests_on_words(self) -> str:
+        """What the verdict takes for granted, in words; empty if the profile gives all, or cannot be read."""
+        return "" if self.fit is None else ", ".join(dict.fromkeys(part.words for part in self.fit.rests_on))
 
     @property
     def status(self) -> Status:
@@ -289,7 +298,8 @@ def check_document(
             findings.append(finding)
     here = {known_as(finding.code, finding.key) for finding in (*found, *(each.finding for each in suppressed))}
     deciding = subject.deciding
-    fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us)
+    rests_on = deciding_cycle(subject.network).rests_on()
+    fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us, rests_on)
     not_run = profile.asks_for_circle and not with_circle
     result = _result(document, profile.name, findings)._replace(
         fit=fit, circle_not_run=not_run, suppressed=tuple(suppressed), mended=tuple(sorted(known - here))

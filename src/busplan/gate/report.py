@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path, PurePath
 from textwrap import wrap
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from unicodedata import category, east_asian_width
 from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -166,7 +166,7 @@ def check_document(report: CheckReport) -> JsonDocument:
             "path": file.path,
             "profile": file.profile,
             "status": file.status,
-            **(file.fit or Fit())._asdict(),
+            **_fit_record(file.fit or Fit()),
             "findings": [finding._asdict() for finding in file.findings],
             "suppressed": [
                 {**each.finding._asdict(), "by": each.by, "reason": each.reason} for each in file.suppressed
@@ -448,6 +448,11 @@ def _clean(text: str) -> str:
 
 _PROFILES: Final = ("profile", "result", "verdict", "corrected margin, us")
 _FINDINGS: Final = ("place", "rule", "severity", "what is wrong", "how to mend it")
+
+
+def _fit_record(fit: Fit) -> dict[str, Any]:
+    rests_on = [{"key": part.key or None, "words": part.words} for part in fit.rests_on]
+    return {**fit._asdict(), "rests_on": rests_on}
 
 
 def markdown_report(report: CheckReport) -> str:

@@ -61,28 +61,22 @@ _PAYLOAD: Final = """\
 read_bytes_per_axis = {bytes}    # as position and status of an axis
 write_bytes_per_axis = {bytes}   # as set-point and control word of an axis
 """
-_EXECUTION: Final = """\
-kind = "linear"
-grade = "assumed"
-base_us = 20               # assumed: {base}
-per_byte_us = 0.1          # assumed: what each byte adds
-"""
-_ALIKE: Final = f"""\
+_ALIKE: Final = """\
 [payload]                  # assumed: see the register map of the nodes; a fixed part is read_bytes, write_bytes
-{{payload}}
+{payload}
 [node]
-axes = {{axes}}
-{{more}}
-[node.execution]           # {{measure}}
-{_EXECUTION}"""
-_GROUP: Final = f"""\
+axes = {axes}
+{more}
+[node.execution]           # {measure}
+{execution}"""
+_GROUP: Final = """\
 [[group]]                  # the groups stand in their order on the bus; the payload is assumed: see the register map
-name = "{{name}}"
-nodes = {{nodes}}
-axes = {{axes}}
-{{more}}{{payload}}
-[group.execution]          # {{measure}}
-{_EXECUTION}"""
+name = "{name}"
+nodes = {nodes}
+axes = {axes}
+{more}{payload}
+[group.execution]          # {measure}
+{execution}"""
 
 
 class NodeGroup(NamedTuple):
@@ -181,7 +175,7 @@ def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) ->
         axes=group.axes,
         payload=_payload(group, bytes_per_axis=machine.bytes_per_axis),
         measure=starter.measure.format(file=file, group=of_group),
-        base=starter.base,
+        execution=starter.execution,
         more=starter.node,
     )
 

@@ -35,6 +35,13 @@ UNKNOWN_SHARE: Final = Sourced(
     source="chosen",
     meaning="standard uncertainty of a time that nobody has measured, as a share of it",
 )
+GUESS_SHARE: Final = Sourced(
+    1 / 3**0.5,
+    unit="1",
+    grade="derived",
+    source="between nothing and twice its value, rectangular (JCGM 100, 4.3.7)",
+    meaning="standard uncertainty of a time that is assumed, as a share of it",
+)
 MEASURED_UNCERTAINTY_US: Final = Sourced(
     0.1 / 12**0.5,
     unit="us",
@@ -51,6 +58,14 @@ DERIVED_UNCERTAINTY_US: Final = Sourced(
     meaning="standard uncertainty of an execution time derived from measured figures",
     symbol="u(T_exec)",
 )
+
+
+def time_uncertainty_us(us: Number, *, is_guess: bool) -> Number:
+    """Standard uncertainty of a time that a machine takes and nobody has measured [us].
+
+    A guess is between nothing and twice its value; a time that is given is known to 10 %.
+    """
+    return choose(is_guess, GUESS_SHARE, UNKNOWN_SHARE) * us
 
 
 class GradedExecution(Section):
@@ -81,12 +96,13 @@ class GradedExecution(Section):
     def standard_uncertainty_us(self, execution_us: Number) -> Number:
         """Standard uncertainty u(T_exec) of an execution time [us].
 
-        The key `uncertainty_us`, or by grade: of a measured time 0.1 / sqrt(12), of a derived time 1 / sqrt(3), else
-        10 % of it.
+        The key `uncertainty_us`, or by grade: of a measured time 0.1 / sqrt(12), of a derived time 1 / sqrt(3), of
+        an assumed one its value / sqrt(3), else 10 % of it.
         """
         if self.uncertainty_us is not None:
             return self.uncertainty_us
-        other_us = choose(self.grade == "derived", DERIVED_UNCERTAINTY_US, UNKNOWN_SHARE * execution_us)
+        unknown_us = time_uncertainty_us(execution_us, is_guess=self.grade == "assumed")
+        other_us = choose(self.grade == "derived", DERIVED_UNCERTAINTY_US, unknown_us)
         return choose(self.grade == "measured", MEASURED_UNCERTAINTY_US, other_us)
 
 

@@ -108,4 +108,4 @@ def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority(orde
 )
 def test_the_card_says_what_is_known_of_queues(changes: dict[str, Any], words: str) -> None:
     lines = busplan.capacity(changed(**changes)).to_dict()["verdicts"][0]["lines"]
-    assert {"label": "rests on", "text": f"{words}; no repeated frames"} in lines
+    assert {"label": "queues", "text": words} in lines

@@ -36,7 +36,7 @@ from busplan.buses.can.waiting import (
     sync_response,
     waits,
 )
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, Premise, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import COVERAGE, EventKind
 from busplan.buses.network import Group, Network, Rate
@@ -86,6 +86,20 @@ STRETCHES: Final = (
 """Stretches that several events make together."""
 
 
+PREMISES: Final = (
+    Premise("bus.error_period_us", "no repeated frames", 10_000.0),
+    Premise("bus.queue", "priority queues", "fifo"),
+    Premise("node.queue", "priority queues", "fifo", lambda cycle: cycle.network.profile.bus.queue is None),
+    Premise("bus.sync_jitter_us", "SYNC without jitter", 50.0, lambda cycle: cycle.traffic.has_sync),
+    Premise("bus.clock_tolerance", "exact clocks", 1e-4),
+    Premise("bus.host_us", "an instant host", 100.0, lambda cycle: cycle.waits_for_host),
+    Premise("bus.sync_counter", "SYNC without counter", True, lambda cycle: cycle.traffic.has_sync),
+    Premise("bus.sync_identifier", "SYNC by its usual identifier", 0x700, lambda cycle: cycle.traffic.has_sync),
+    Premise("message", "no other messages"),
+    Premise("message.jitter_us", "messages without jitter", 100.0),
+)
+
+
 class CanCycle(BusCycle):
     """SYNC's jitter, SYNC, the wait for the slowest node, feedback PDOs, the host, command PDOs, and the window.
 
@@ -100,6 +114,7 @@ class CanCycle(BusCycle):
     """
 
     term_figures = TERMS
+    premises = PREMISES
     command_events = (("command", "command_frame"),)
 
     def __init__(
@@ -404,6 +419,11 @@ class CanCycle(BusCycle):
         """The same cycle with other traffic."""
         return CanCycle(self.network, self.model, self.number, traffic=traffic)
 
+    @property
+    def waits_for_host(self) -> bool:
+        """Whether the cycle contains the host's own time; of plain numbers."""
+        return self.traffic.has_cycle and not (self.traffic.has_sync and self.network.profile.bus.pipeline_cycles)
+
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time and longer FD frames, by half of what they change; and the host's own time."""
         if not self.traffic.has_cycle:
@@ -420,38 +440,6 @@ class CanCycle(BusCycle):
         late_us = (self._of(self.traffic.longest).required_us - self.required_us) / 2
         key = "bus.clock_tolerance" if bus.clock_tolerance else "fd_late_bits"
         return *doubts, Doubt(key, "longer bits and FD frames", late_us)
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The host's own time, the slowest execution, and what else is on the bus."""
-        if not self.traffic.has_cycle:
-            return ()
-        bus = self.network.profile.bus
-        is_beside = self.traffic.has_sync and bus.pipeline_cycles
-        host = () if is_beside or bus.host_us else (LeftOut("host time", "bus.host_us"),)
-        slowest = (
-            LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
-            for group in self.network.groups
-            if not group.worst_extra_us
-        )
-        traffic = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
-        return (*host, *slowest, *traffic)
-
-    def premises(self) -> tuple[str, ...]:
-        """The order of queues, and how often an error repeats a frame."""
-        bus, groups = self.network.profile.bus, self.network.groups
-        orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
-        known = sorted(order for order in orders if order is not None)
-        queues = f"queues: {' and '.join(known)}" if known else ""
-        if any(order in NOT_BY_PRIORITY for order in known):
-            senders = dict.fromkeys(message.sender for message in self.network.profile.message if message.sender)
-            queues += f" (senders {first_of(list(senders), 8)})" if senders else ""
-        if None in orders:
-            queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
-        if is_off(self.traffic.error_burst):
-            return queues, "no repeated frames"
-        burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
-        at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return queues, f"repeated frames: {at_once}1 every {period_us:g} us"
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -492,6 +480,17 @@ class CanCycle(BusCycle):
             return choose(left >= 0, 0.0, inf)
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
+    def _queues(self) -> str:
+        """Orders of queues that the profile gives, and the senders, so that a misspelt one is seen; else empty."""
+        bus = self.network.profile.bus
+        orders = {group.node.queue or bus.queue for group in self.network.groups} | {bus.queue}
+        known = sorted(order for order in orders if order is not None)
+        words = " and ".join(known)
+        if any(order in NOT_BY_PRIORITY for order in known):
+            senders = dict.fromkeys(message.sender for message in self.network.profile.message if message.sender)
+            words += f" (senders {first_of(list(senders), 8)})" if senders else ""
+        return words
+
     def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:
         """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
         most = self.network.profile.most_load
@@ -500,6 +499,8 @@ class CanCycle(BusCycle):
             fullest = self._in_cycle_us / self.traffic.period_us + self._messages_load
             words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
         lines = [("load", words)]
+        if queues := self._queues():
+            lines.append(("queues", queues))
         if self._messages:
             answers = message_responses(self.traffic.longest)
             latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)

@@ -28,7 +28,6 @@ from busplan.sections.base import (
     TransactionKind,
 )
 from busplan.sections.cycle import (
-    UNKNOWN_SHARE,
     BusSection,
     CycleSection,
     GroupAxes,
@@ -37,6 +36,7 @@ from busplan.sections.cycle import (
     Limits,
     NodeSection,
     PayloadSection,
+    time_uncertainty_us,
 )
 from busplan.sections.profile import CIRCLE_SECTIONS, OF_ALIKE_NODES, Profile
 
@@ -105,8 +105,8 @@ class CanBus(BusSection):
     )
     host_uncertainty_us: TimeUs | None = Field(
         default=None,
-        description="Standard uncertainty of host_us; without it 10 % where that is measured or derived, else 50 % "
-        "[us]",
+        description="Standard uncertainty of host_us; without it 10 % where that is graded other than assumed, else "
+        "host_us / sqrt(3) [us]",
         examples=[5],
     )
     queue: Queue | None = Field(
@@ -151,8 +151,7 @@ class CanBus(BusSection):
         """Standard uncertainty of the host's own time [us]."""
         if self.host_uncertainty_us is not None:
             return self.host_uncertainty_us
-        share = UNKNOWN_SHARE if self.host_grade in ("measured", "derived") else c.UNMEASURED_SHARE
-        return share * self.host_us
+        return time_uncertainty_us(self.host_us, is_guess=self.host_grade in (None, "assumed"))
 
 
 class CanPayload(PayloadSection):

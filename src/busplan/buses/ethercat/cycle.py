@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, reduce
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, Premise, Run
 from busplan.buses.ethercat.equations import (
     FRAME,
     LATENCY_TABLE,
@@ -60,12 +60,6 @@ STRETCHES: Final = (
     EventKind("way", "way through the devices", "", "W", "work"),
 )
 """Kinds of a sequence of events."""
-_LEFT_OUT: Final = {
-    "bus.master_us": "the master's own time",
-    "bus.master_jitter_us": "the master's jitter",
-    "bus.mailbox_polls": "mailbox polls",
-}
-"""Keys of [bus] whose part of the cycle is left out while they are 0."""
 
 
 def sync0_us(network: Network) -> Number:
@@ -79,10 +73,23 @@ def sync0_share(network: Network) -> Number:
     return choose(shift > 0, shift, 1)
 
 
+PREMISES: Final = (
+    Premise("bus.master_us", "an instant master", 40.0),
+    Premise("bus.master_jitter_us", "no jitter of the master", 20.0),
+    Premise("bus.mailbox_polls", "no mailbox polls", 1),
+    Premise("node.cable_length_m", "no length of cables", 10.0),
+    Premise("node.delay_us", "usual delays of devices"),
+    Premise("bus.master", "the frames of a usual master"),
+    Premise("bus.process_data", "the frames of a usual master"),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2),
+)
+
+
 class EthercatCycle(BusCycle):
     """The master's time and jitter, frames, devices and cables there and back, and the non-periodic window."""
 
     term_figures = TERMS
+    premises = PREMISES
 
     def __init__(self, network: Network, model: str, number: int | None = None) -> None:
         self.network = network
@@ -176,17 +183,6 @@ class EthercatCycle(BusCycle):
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
             Doubt("bytes", "what a byte takes beyond the wire", self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US),
         )
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The master's own time and jitter, mailbox polls, and cables without a length."""
-        bus = self.network.profile.bus
-        values = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
-        values |= {
-            group.key("cable_length_m"): group.node.cable_length_m
-            for group in self.network.groups
-            if group.node.port != "E-bus"
-        }
-        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in values.items() if not value)
 
     def _frames(self) -> Iterator[BusEvent]:
         """Each frame: its overhead, then the data of each device in it."""

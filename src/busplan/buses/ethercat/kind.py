@@ -187,7 +187,7 @@ def _host(us: int, source: str) -> str:
     time = f"master_us = {us}".ljust(26)
     return f"""\
 {time} # assumed: {source}; measure it
-master_grade = "assumed"   # so half of it is its standard uncertainty"""
+master_grade = "assumed"   # between nothing and twice its value"""
 
 
 class Ethercat(Bus):

@@ -20,13 +20,13 @@ from busplan.elementwise import Number
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, refused
 from busplan.sections.cycle import (
-    UNKNOWN_SHARE,
     BusSection,
     Execution,
     GroupAxes,
     GroupSection,
     NodeSection,
     PayloadSection,
+    time_uncertainty_us,
 )
 from busplan.sections.profile import Profile
 
@@ -88,8 +88,8 @@ class EthercatBus(BusSection):
     )
     master_uncertainty_us: TimeUs | None = Field(
         default=None,
-        description="Standard uncertainty of master_us; without it 10 % where that is measured, derived or "
-        "calibrated, else 50 % [us]",
+        description="Standard uncertainty of master_us; without it 10 % where that is graded other than assumed, "
+        "else master_us / sqrt(3) [us]",
         examples=[5],
     )
     master_jitter_us: TimeUs = Field(default=0.0, description="How late the frames may start [us]", examples=[20])
@@ -114,8 +114,7 @@ class EthercatBus(BusSection):
         """Standard uncertainty of the master's own time [us]."""
         if self.master_uncertainty_us is not None:
             return self.master_uncertainty_us
-        is_known = self.master_grade in ("measured", "derived", "calibrated")
-        return (UNKNOWN_SHARE if is_known else c.UNMEASURED_MASTER_SHARE) * self.master_us
+        return time_uncertainty_us(self.master_us, is_guess=self.master_grade in (None, "assumed"))
 
 
 class EthercatNode(NodeSection):

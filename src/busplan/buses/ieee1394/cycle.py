@@ -7,7 +7,7 @@ from itertools import product, repeat
 from math import ceil
 from typing import Final
 
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, Premise, Run, summed
 from busplan.buses.figure import AVAILABLE, NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
@@ -18,7 +18,6 @@ from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delay
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     GroupHops,
-    answers_split,
     charges_own_hops,
     events,
     exchange,
@@ -66,6 +65,16 @@ STRETCHES: Final = (
 """Stretches that several events make together."""
 
 
+PREMISES: Final = (
+    Premise("", "packets and cables alone, never measured", applies=lambda cycle: not cycle.link.has_gaps),
+    Premise("host.transaction_us", "an instant host", 10.0),
+    Premise("cycle.retries", "no busy retries", 1),
+    Premise("bus.isochronous_us", "no isochronous traffic", 20.0, lambda cycle: cycle.network.profile.bus.cycle_master),
+    Premise("bus.phy_delay_us", "PHYs of 14 ticks", 0.144),
+    Premise("bus.max_hops", "a chain of cables", 63),
+)
+
+
 class CycleWithStarts(BusCycle):
     """One communication cycle; what the host and the nodes send in it is that of a schedule.
 
@@ -75,6 +84,7 @@ class CycleWithStarts(BusCycle):
     """
 
     term_figures = TERMS
+    premises = PREMISES
     command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     model: TimingModelName
 
@@ -207,15 +217,10 @@ class CycleWithStarts(BusCycle):
         """Number of nodes by equation (11) [1]; None where the paper has none for this schedule or these nodes."""
         return None
 
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The host's time, if the profile does not give it."""
-        return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
-
-    def premises(self) -> tuple[str, ...]:
-        """Note of a lower bound: no bus of this speed was measured."""
-        if self.link.has_gaps:
-            return ()
-        return (f"packets and cables alone: no bus at {self.network.profile.bus.speed} was measured",)
+    @property
+    def executes(self) -> bool:
+        """Other answers than split ones, and broadcasts, keep the execution off the bus."""
+        return self.network.bus.has_execution(self.network)
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
@@ -368,12 +373,3 @@ class Ieee1394Cycle(CycleWithStarts):
             phases = {"hops": link.hops, "gap_count": link.gap_count, **sent.phases._asdict()}
             latencies.append(BusLatency(kind, sent.payload_bytes, phases, sent.group.name))
         return tuple(latencies)
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """Parts of the cycle that the profile does not give."""
-        slowest = (
-            LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
-            for group in self.network.groups
-            if answers_split(group) and not group.worst_extra_us
-        )
-        return (*super().left_out(), *slowest)

@@ -14,7 +14,6 @@ from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import (
-    UNKNOWN_SHARE,
     BusSection,
     CycleSection,
     GroupAxes,
@@ -24,6 +23,7 @@ from busplan.sections.cycle import (
     PayloadSection,
     SliceRatio,
     TableExecution,
+    time_uncertainty_us,
 )
 from busplan.sections.profile import Profile
 
@@ -81,9 +81,10 @@ class Ieee1394Bus(BusSection):
         examples=["standard"],
     )
     cycle_master: bool = Field(
-        default=False,
-        description="Whether a node sends cycle start packets, one every 125 us; an OHCI host does by default "
-        "(Linux, ohci.c)",
+        default=True,
+        description="Whether a node sends cycle start packets, one every 125 us: an OHCI host does by default "
+        "(Linux, ohci.c), so without the key the standard model counts them, assumed; the paper model has no term "
+        "for them",
         examples=[True],
     )
     isochronous_us: Annotated[float, Field(ge=0, le=float(c.unchanged["CYCLE_US"]), allow_inf_nan=False)] = Field(
@@ -233,9 +234,13 @@ class Host(Section):
     transaction_us: TimeUs = Field(
         default=0.0, description="The host's own time between a response and its next request [us]", examples=[5]
     )
+    grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None, description="How transaction_us is known", examples=["measured"]
+    )
     uncertainty_us: TimeUs | None = Field(
         default=None,
-        description="Standard uncertainty of transaction_us; without it 10 % of it [us]",
+        description="Standard uncertainty of transaction_us; without it 10 % of it, where it is assumed "
+        "transaction_us / sqrt(3) [us]",
         examples=[0.5],
     )
 
@@ -244,8 +249,9 @@ class Host(Section):
         """Standard uncertainty u(host) [us]."""
         if self.uncertainty_us is not None:
             return self.uncertainty_us
+        unknown_us = time_uncertainty_us(self.transaction_us, is_guess=self.grade == "assumed")
         # No time rests on no assumption.
-        return choose(self.transaction_us == 0, 0.0, UNKNOWN_SHARE * self.transaction_us)
+        return choose(self.transaction_us == 0, 0.0, unknown_us)
 
 
 class Ieee1394Profile(Profile):

@@ -4,13 +4,14 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property, reduce
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Run
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.polled.protocols import BUFFERED, Protocol, Requests, Times, c, protocol_of, times
 from busplan.elementwise import Number, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.cycle import time_uncertainty_us
 
 TimingModelName = Literal["standard", "typical"]
 STANDARD: Final[TimingModelName] = "standard"
@@ -81,10 +82,22 @@ STRETCHES: Final = (
 )
 
 
+PREMISES: Final = (
+    Premise("bus.host_us", "an instant host", 100.0),
+    Premise("bus.adapter_us", "no adapter", 1000.0),
+    Premise("bus.retries", "no repeated requests", 1),
+    Premise("bus.max_turn_bits", "answers as the protocol says"),
+    Premise("bus.reads", "one read a node", 2),
+    Premise("bus.writes", "one write a node", 2),
+    Premise("", "no stuffed bytes", applies=lambda cycle: cycle.network.profile.bus.protocol == "dynamixel-2"),
+)
+
+
 class PolledCycle(BusCycle):
     """All feedback, then all commands; or an exchange with each node in turn."""
 
     term_figures = TERMS
+    premises = PREMISES
     command_events = (("exchange", "request"), ("write", "request"))
 
     def __init__(self, network: Network, model: str) -> None:
@@ -255,30 +268,20 @@ class PolledCycle(BusCycle):
                 "bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * c["SHARES[ADAPTER_SHARE]"]
             ),
         ]
+        host_us: Number = time_uncertainty_us(self.network.profile.bus.host_us, is_guess=False)
+        doubts.append(Doubt("bus.host_us", "the host's own time", host_us))
         if self.network.profile.bus.protocol not in BUFFERED:
+            execution_us: list[Number] = []
             for group in groups:
                 reads, writes = self._answers(group, "read"), self._answers(group, "write")
                 us = reads * group.read_uncertainty_us + writes * group.write_uncertainty_us
                 if self.way == "exchange":
                     us = reads * larger(group.read_uncertainty_us, group.write_uncertainty_us)
-                label = f"execution time of {group.name}" if group.name else "execution time"
-                doubts.append(Doubt(group.key("execution"), label, us))
+                execution_us.append(us)
+            # Times of several groups are measured, or guessed, in the same way: they are taken to err together.
+            key = "node.execution" if self.network.is_uniform else "group.execution"
+            doubts.append(Doubt(key, "execution time", total(execution_us)))
         return tuple(doubts)
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The host's own time and its adapter."""
-        bus = self.network.profile.bus
-        parts = (
-            (bus.host_us, LeftOut("host time", "bus.host_us")),
-            (bus.adapter_us or bus.protocol in BUFFERED, LeftOut("the host's adapter", "bus.adapter_us")),
-        )
-        return tuple(left_out for given, left_out in parts if not given)
-
-    def premises(self) -> tuple[str, ...]:
-        """What no key gives."""
-        if self.network.profile.bus.protocol == "dynamixel-2":
-            return ("no byte of the data is stuffed (at most one in three would be)",)
-        return ()
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate."""

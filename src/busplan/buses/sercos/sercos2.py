@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, Premise, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind, Periods
 from busplan.buses.network import Network
@@ -137,10 +137,20 @@ STRETCHES: Final = (
 """Stretches that several events make together."""
 
 
+PREMISES: Final = (
+    Premise("bus.recovery_us", "no recovery after the MDT", 50.0),
+    Premise("bus.at_start_us", "the first AT as early as it can be"),
+    Premise("bus.turnaround_us", "the published turn-around"),
+    Premise("bus.at_gap_us", "the usual gap between drives"),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2),
+)
+
+
 class Sercos2Cycle(SercosCycle):
     """MST, t1, an AT of each drive with gaps between them, t_ATMT, the MDT, and the drives' recovery."""
 
     term_figures = TERMS
+    premises = PREMISES
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -185,11 +195,6 @@ class Sercos2Cycle(SercosCycle):
     def doubts(self) -> tuple[Doubt, ...]:
         """The gap between two drives, which is the same in the whole cycle."""
         return (Doubt("bus.at_gap_us", "gap between two drives", self.by_term["cycle_gap_us"] * c.GAP_SHARE),)
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The drives' recovery after the MDT."""
-        recovery_us = self.network.profile.bus.recovery_us
-        return () if recovery_us else (LeftOut("the recovery of the drives after the MDT", "bus.recovery_us"),)
 
     def figures(self) -> Mapping[str, Number | None]:
         """The data rate, and the data of the MDT."""

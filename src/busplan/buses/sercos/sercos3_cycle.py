@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, Premise, Run
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Network
@@ -49,6 +49,17 @@ STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT
 """Stretches that several events make together."""
 
 
+PREMISES: Final = (
+    Premise("bus.at_start_us", "no least time before the AT", 50.0),
+    Premise("bus.device_delay_us", "published delays"),
+    Premise("bus.component_delay_us", "published delays"),
+    Premise("bus.master_delay_us", "a published master"),
+    Premise("bus.master_jitter_us", "a published master"),
+    Premise("bus.gap_bytes", "the usual gap between telegrams"),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2),
+)
+
+
 class Sercos3Cycle(SercosCycle):
     """MDT, AT, the channel for other frames, and under the model `window` jitter, the master, the ring and the devices.
 
@@ -57,6 +68,7 @@ class Sercos3Cycle(SercosCycle):
     """
 
     term_figures = TERMS
+    premises = PREMISES
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -170,13 +182,6 @@ class Sercos3Cycle(SercosCycle):
             ),
             Doubt("bus.device_delay_us", "delay of the devices", delays_us * c.DEVICE_DELAY_SHARE),
         )
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """The channel for other frames, and the devices' least time before the AT."""
-        least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
-        channel = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
-        terms = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, channel))
-        return tuple(term for is_given, term in terms if not is_given)
 
     def figures(self) -> Mapping[str, Number | None]:
         """Numbers of telegrams."""

@@ -53,6 +53,8 @@ def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(answer.verdicts, start=1):
         yield card(verdict, is_brief=number < len(answer.verdicts))
+    if answer.verdicts[-1].rests_on:
+        yield _rests_on_table(answer.verdicts[-1])
     yield _table(answer)
     if answer.profile.group:
         yield _groups_table(answer)
@@ -134,6 +136,13 @@ def _state(row: Figure, values: Mapping[str, Any]) -> State:
     return "neutral"
 
 
+def _rests_on_table(verdict: Verdict) -> Table:
+    """What the profile does not give and the verdict takes for granted."""
+    rows = (TableRow((part.words, Code(part.key) if part.key else "none")) for part in verdict.rests_on)
+    columns = TableColumn("taken", kind="words"), TableColumn("key that gives it", kind="words")
+    return Table(columns, tuple(rows), Sentence(("What the verdict rests on, as the profile does not give it",)))
+
+
 def _groups_table(answer: CapacityAnswer) -> Table:
     """How many nodes of each group fit each period, the other groups as they are."""
     columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
@@ -181,7 +190,7 @@ def _verdict(verdict: Verdict) -> Record:
         **fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": verdict.network.profile.limits.reserve,
-        "not_in_uncertainty": [part.key for part in verdict.left_out],
+        "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],
         "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
         "cheapest_change": change and _change_record(change),
         "setting_change": verdict.setting and _change_record(verdict.setting),

@@ -1,11 +1,11 @@
 """The verdict on one period, and its card: the lines that sum it up in every form of output."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, isfinite, log10
 from typing import Final
 
-from busplan.buses.cycle import LeftOut
+from busplan.buses.cycle import RestsOn
 from busplan.buses.network import Network
 from busplan.buses.rule import contradicts
 from busplan.elementwise import FIT_ROUNDING, plain
@@ -76,10 +76,8 @@ class Verdict:
     """Figures after a bus reset; None unless the cycle is shown to fit now and not after the reset."""
     assumptions: tuple[HeavyAssumption, ...]
     """Assumptions with a large share of the required time or of its variance."""
-    left_out: tuple[LeftOut, ...]
-    """Keys not set that could add time to the cycle."""
-    premises: tuple[str, ...]
-    """Premises of the verdict that no key of the profile states."""
+    rests_on: tuple[RestsOn, ...]
+    """What the profile does not give and the verdict takes for granted, what matters most first."""
     bus_lines: tuple[tuple[str, str], ...]
     """Lines of the card that only this kind of bus has: label and words."""
     warnings: tuple[str, ...]
@@ -139,8 +137,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         best_register=None if fastest is None else best_register(network, fastest),
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
-        left_out=cycle.left_out(),
-        premises=cycle.premises(),
+        rests_on=cycle.rests_on(),
         bus_lines=cycle.card_lines(is_shown_to_fit),
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,
@@ -178,6 +175,8 @@ def _setting(network: Network, now: CapacityFigures, change: Change) -> Change |
     return Change(values, change.nodes, figures(changed(target, values), model=now.timing_model))
 
 
+_CARD_WORDS: Final = 62
+"""Most characters of what the verdict rests on in a line of the card."""
 _DIGITS: Final = 3
 """Significant digits of a time whose uncertainty is unknown."""
 _MOST_DECIMALS: Final = 6
@@ -320,6 +319,18 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
         yield name, joined(settings, Sentence((left,)), by="")
 
 
+def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
+    """What a verdict rests on in words: all, or the first that a line of some characters holds and how many more."""
+    words = [*dict.fromkeys(part.words for part in rests_on)]
+    if most is None or len(", ".join(words)) <= most:
+        return ", ".join(words)
+    for count in range(len(words) - 1, 0, -1):
+        text = f"{', '.join(words[:count])} and {len(words) - count} more"
+        if len(text) <= most:
+            break
+    return text
+
+
 def _buses(figures: CapacityFigures) -> Iterator[_Line]:
     """How many such buses would carry all nodes, where one is not shown to."""
     most = figures.safe_nodes or 0
@@ -344,10 +355,8 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
     for assumption in verdict.assumptions:
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
-    if verdict.left_out:
-        yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
-    if verdict.premises:
-        yield "rests on", Sentence(("; ".join(verdict.premises),))
+    if verdict.rests_on:
+        yield "rests on", Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
     yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=bool(network.groups)),))
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):

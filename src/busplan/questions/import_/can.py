@@ -333,7 +333,9 @@ def _set_senders(messages: Sequence[Facts], machine: Reading, owners: dict[int, 
         if "sender" in facts and facts["identifier"].value not in shown:
             device = facts["sender"]
             if len(same := known.get(device.value, set())) == 1:
-                facts["sender"] = Fact(*same, device.place, "derived", f"{device.value} sends its messages, too")
+                facts["sender"] = Fact(
+                    next(iter(same)), device.place, "derived", f"{device.value} sends its messages, too"
+                )
 
 
 def _is_fd(facts: Facts) -> bool:

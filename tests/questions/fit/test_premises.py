@@ -1,0 +1,134 @@
+"""What a profile does not give and makes a plan worse is said: a property over the schema of every kind."""
+
+from collections.abc import Iterator, Mapping
+from math import inf
+from typing import Any, Literal, get_args, get_origin
+
+import pytest
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+import busplan
+from busplan.buses import kind_named, kind_names
+from busplan.elementwise import plain
+from busplan.errors import BusplanError
+from busplan.profile.document import decode, validate
+from busplan.profile.kinds import models_of
+from busplan.profile.starter import Machine, machine_text, shared_out
+from busplan.questions.fit.certainty import certainty, deciding_cycle
+from busplan.questions.fit.network import network_of
+
+SECTIONS = ("bus", "cycle", "node", "host")
+"""What the machine is. A payload, limits and tolerances are what is asked of it: the user states them."""
+KNOWLEDGE = ("grade", "uncertainty_us", "residual", "measured_gap_count")
+"""Ends of keys that say how well another value is known: without that value they say nothing."""
+
+
+def starters() -> Iterator[Any]:
+    for kind in kind_names():
+        for variant in ("", *kind_named(kind).starter.variants):
+            yield pytest.param(kind, variant, id=f"{kind} {variant}".strip())
+
+
+def new_profile(kind: str, variant: str) -> busplan.Profile:
+    """The profile that `init` writes."""
+    machine = Machine(shared_out(6, nodes=6), 10_000.0, 4, variant=variant)
+    return validate(decode(machine_text(machine, kind=kind, name="new", file="new.toml").encode(), name="new"))
+
+
+def not_given(section: BaseModel, prefix: str) -> Iterator[tuple[str, FieldInfo]]:
+    """Keys that a section does not give, with their fields."""
+    for name, field in type(section).model_fields.items():
+        key, value = f"{prefix}.{name}", getattr(section, name)
+        if isinstance(value, BaseModel):
+            yield from not_given(value, key)
+        elif name not in section.model_fields_set and not models_of(field.annotation):
+            yield key, field
+
+
+def candidates(field: FieldInfo, default: object) -> Iterator[object]:
+    """Values by the schema: the other truth, each word, the examples and ten times each number."""
+    if isinstance(default, bool):
+        yield not default
+        return
+    yield from words_of(field.annotation)
+    for value in field.examples or ():
+        yield value
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            yield 10 * value
+            if default:
+                yield type(value)(2 * default)  # type: ignore[operator]
+
+
+def words_of(annotation: Any) -> Iterator[str]:
+    if get_origin(annotation) is Literal:
+        yield from (word for word in get_args(annotation) if isinstance(word, str))
+    for argument in get_args(annotation):
+        yield from words_of(argument)
+
+
+def worth(profile: busplan.Profile) -> Mapping[str, float]:
+    """All that may get worse: times, responses and bounds, the larger the worse."""
+    network = network_of(profile)
+    cycle = deciding_cycle(network)
+    weighed = certainty(cycle)
+    found = {
+        "required": plain(cycle.required_us),
+        "possible": plain(cycle.possible_us()),
+        "safe": plain(weighed.safe_required_us) + plain(cycle.possible_us()),
+        "jitter": plain(cycle.sync_jitter_us()),
+    }
+    for limit in network.bus.limits:
+        least = plain(limit.value(network)) + plain(limit.uncertainty(network))
+        found[f"limit {limit.key}"] = least - plain(limit.most(network))
+    for latency in cycle.latencies():
+        found[latency.label] = max(map(plain, latency.phases.values()))
+    return found
+
+
+def worse(kind: str, variant: str) -> Mapping[str, tuple[object, str]]:
+    """Keys that the new profile does not give and that make a plan worse, each with a value and what gets worse."""
+    profile = new_profile(kind, variant)
+    network = network_of(profile)
+    bus, before, found = network.bus, worth(profile), dict[str, tuple[object, str]]()
+    usual = {premise.key: premise.usual for premise in deciding_cycle(network).premises}
+    # Settings that a plan turns, and words that select a formula, are the design's choice.
+    chosen = {key for setting in bus.settings(network) for key in setting.keys}
+    chosen |= {key for key, facts in bus.keys.items() if facts.chooses}
+    for section in SECTIONS:
+        part = getattr(profile, section, None)
+        for key, field in () if part is None else not_given(part, section):
+            if key in chosen or key.endswith(KNOWLEDGE):
+                continue
+            default = field.default
+            for value in [usual[key]] if usual.get(key) is not None else candidates(field, default):
+                try:
+                    after = worth(busplan.load_profile(profile, changes={key: value}))
+                except (BusplanError, ValueError):
+                    continue
+                names = [
+                    name for name in before if after.get(name, -inf) > before[name] + 1e-9 * (1 + abs(before[name]))
+                ]
+                if names:
+                    found[key] = value, names[0]
+                    break
+    return found
+
+
+@pytest.mark.parametrize(("kind", "variant"), list(starters()))
+def test_what_is_not_given_and_makes_a_plan_worse_is_said(kind: str, variant: str) -> None:
+    said = {part.key for part in deciding_cycle(network_of(new_profile(kind, variant))).rests_on()}
+    assert {key: why for key, why in worse(kind, variant).items() if key not in said} == {}
+
+
+@pytest.mark.parametrize("kind", ["ieee1394", "can", "polled"])
+@pytest.mark.parametrize("period_us", [3000.0, 5000.0, 8000.0, 12_000.0, 20_000.0])
+def test_a_verdict_on_a_guess_holds_at_twice_the_guess(kind: str, period_us: float) -> None:
+    profile = busplan.load_profile(new_profile(kind, ""), changes={"cycle.period_us": period_us, "limits.reserve": 0.0})
+    execution = profile.node.execution
+    names = ("time_us",) if execution.kind == "table" else ("base_us", "per_byte_us")
+    values = {f"node.execution.{name}": getattr(execution, name) for name in names}
+    twice = {key: [2 * one for one in us] if isinstance(us, tuple) else 2 * us for key, us in values.items()}
+    doubled = busplan.load_profile(profile, changes=twice)
+    (found, *_), (then, *_) = busplan.capacity(profile).results, busplan.capacity(doubled).results
+    assert found.verdict != "fits" or then.fits
