@@ -15,7 +15,6 @@ from busplan.buses.sercos.sercos3 import (
     TimingMethod,
     Version,
 )
-from busplan.buses.sercos.sercos3_cycle import WINDOW, TimingModelName
 from busplan.buses.sercos.shared import MOST_PIPELINE, PIPELINE_CYCLES
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
@@ -81,11 +80,6 @@ class Sercos3Bus(BusSection):
         default=int(PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it, for a loop on the host",
         examples=[2],
-    )
-    timing_model: TimingModelName = Field(
-        default=WINDOW,
-        description="Timing model whose figures lead the tables; the verdict is always by window",
-        examples=[WINDOW],
     )
 
 

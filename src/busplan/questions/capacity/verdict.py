@@ -16,6 +16,7 @@ from busplan.forms.numbers import period
 from busplan.profile.edit import short_text
 from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
+from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure, cure_by_setting
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
@@ -25,18 +26,8 @@ from busplan.questions.fit.figures import (
     limits_behind,
 )
 from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
+from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits, smallest_period
 from busplan.questions.fit.network import changed
-from busplan.questions.plan.search import (
-    NODES,
-    Changes,
-    SettingForPeriod,
-    SmallestPeriod,
-    best_register,
-    cure,
-    cure_by_setting,
-    missed_limits,
-    smallest_period,
-)
 from busplan.sections.base import MAX_COUNT
 
 
@@ -66,7 +57,7 @@ class Verdict:
     """Figures of the other models that were asked for."""
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
-    missed_limits: tuple[tuple[str, str], ...]
+    missed_limits: tuple[MissedLimit, ...]
     """Keys of [limits] that the network does not keep, each with the reason."""
     fastest: SmallestPeriod | None
     """The shortest period with the verdict "fits"; None for a network without a cycle."""
@@ -124,8 +115,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         network, model=model
     )
     cycle, period_us = bus.cycle(network, model=model), deciding.period_us
-    ratio = float(plain(network.slice_ratio))
-    missed = {need.key: need.words(ratio=ratio, most_us=period_us) for need in missed_limits(network)}
+    missed = missed_limits(network)
     change, no_change = _change(network, deciding, is_missed=bool(missed))
     fastest = smallest_period(network, is_safe=False, with_limits=False) if network.groups else None
     return Verdict(
@@ -134,7 +124,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
         broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
-        missed_limits=tuple(missed.items()),
+        missed_limits=missed,
         fastest=fastest,
         best_register=None if fastest is None else best_register(network, fastest),
         after_reset=after_reset(network, deciding),
@@ -252,7 +242,9 @@ def _reasons(verdict: Verdict) -> Iterator[_Line]:
     if not verdict.deciding.safe:
         yield "unsafe", Sentence((verdict.network.bus.safety.setting,), "fails")
     if verdict.deciding.verdict == FITS:
-        yield from (("[limits]", Sentence((words,), "fails")) for _, words in verdict.missed_limits)
+        # Of several groups with too little room, the first.
+        first = {missed.key: missed.words for missed in reversed(verdict.missed_limits)}
+        yield from (("[limits]", Sentence((words,), "fails")) for words in reversed(first.values()))
 
 
 def _times(verdict: Verdict) -> Iterator[_Line]:

@@ -23,21 +23,20 @@ from busplan.questions.base.inputs import (
     values_by_key,
     whole,
 )
-from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
-from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
-from busplan.questions.plan.search import (
+from busplan.questions.fit.cure import (
     Changes,
     Freedom,
-    Need,
     PlanStep,
     freed,
     freedoms,
-    most_asking,
     nodes_for_axes,
     search,
     settings_to_be_carried,
     stands_in_the_way,
 )
+from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
+from busplan.questions.fit.needs import Need, most_asking
+from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
 from busplan.sections.profile import Profile
 
 

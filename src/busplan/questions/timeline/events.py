@@ -17,7 +17,6 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import fits_in
 from busplan.questions.fit.figures import FitFigures, figures, margin_us
-from busplan.questions.fit.network import leading_model
 from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
@@ -131,7 +130,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     network
         The network.
     model
-        Timing model; without it the one whose figures lead.
+        Timing model; without it the one that decides.
     number
         Number of the cycle, from 1; by default the cycle that the verdict is for.
 
@@ -160,7 +159,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
-    model = leading_model(network) if model is None else model
+    model = network.bus.deciding_model if model is None else model
     closed, cycle = figures(network, model=model), cycle_of(network, model, number)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
