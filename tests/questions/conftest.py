@@ -21,7 +21,7 @@ def make_profile(**changes: Any) -> busplan.Profile:
     data: dict[str, Any] = {
         "schema_version": 1,
         "name": "test",
-        "bus": {"kind": "ieee1394", "speed": "S400", "gap_count": 63, "nodes": 2, "timing_model": "standard"},
+        "bus": {"kind": "ieee1394", "speed": "S400", "gap_count": 63, "nodes": 2},
         "cycle": {"period_us": 4000.0, "slice_ratio": 0.5, "sync": {}},
         "payload": {"read_bytes": 12, "write_bytes": 12},
         "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}},

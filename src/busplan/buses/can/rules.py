@@ -295,6 +295,7 @@ LIMITS: Final = (
         perhaps=_assumed_periods,
         way_out="give message.NAME.period_us as it is known",
         place="message",
+        of_deadlines=True,
     ),
     Limit(
         "senders",
@@ -304,6 +305,7 @@ LIMITS: Final = (
         perhaps=lambda network: len(_unknown_senders(network)),
         way_out="give message.NAME.sender",
         place="bus.queue",
+        of_deadlines=True,
     ),
     Limit(
         "deadline",
@@ -315,6 +317,7 @@ LIMITS: Final = (
         period=lambda limit, network: _kept_from_us(network, is_shown=limit.perhaps is None),
         has_rule=True,
         is_slow=True,
+        of_deadlines=True,
     ),
 )
 

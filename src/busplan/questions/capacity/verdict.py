@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import ceil, floor, isfinite, log10
-from typing import Final
+from math import ceil
 
 from busplan.buses.cycle import LeftOut
 from busplan.buses.network import Network
@@ -14,7 +13,16 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import period
 from busplan.profile.edit import short_text
-from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
+from busplan.questions.base.sentences import (
+    change_meanings,
+    checked_against,
+    percent_text,
+    settings_sentence,
+    time_decimals,
+    time_lines,
+    time_text,
+    used_us,
+)
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure, cure_by_setting
 from busplan.questions.fit.figures import (
@@ -168,10 +176,6 @@ def _setting(network: Network, now: CapacityFigures, change: Change) -> Change |
     return Change(values, change.nodes, figures(changed(target, values), model=now.timing_model))
 
 
-_DIGITS: Final = 3
-"""Significant digits of a time whose uncertainty is unknown."""
-_MOST_DECIMALS: Final = 6
-"""Most decimals of a time in us: below a picosecond there is only float rounding."""
 _Line = tuple[str, Sentence]
 
 
@@ -214,9 +218,9 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     figures, network = verdict.deciding, verdict.network
     state: State = "passes" if figures.verdict == FITS else "fails"
     if network.groups:
-        available_us, whole_us = figures.available_us, max(figures.period_us, _used_us(figures))
+        available_us, whole_us = figures.available_us, max(figures.period_us, used_us(figures))
         return Gauge(
-            used=_used_us(figures) / whole_us,
+            used=used_us(figures) / whole_us,
             doubt=(figures.uncertainty_us or 0.0) / whole_us,
             free_until=available_us * (1 - network.profile.limits.reserve) / whole_us,
             most=available_us / whole_us,
@@ -228,11 +232,6 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     load, most = plain(limit.value(network)), plain(limit.most(network))
     whole = max(1.0, load)
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
-
-
-def _used_us(figures: CapacityFigures) -> float:
-    """Time the cycle takes, with the bias of the model [us]."""
-    return figures.available_us - (figures.margin_corrected_us or 0.0)
 
 
 def _reasons(verdict: Verdict) -> Iterator[_Line]:
@@ -248,17 +247,7 @@ def _reasons(verdict: Verdict) -> Iterator[_Line]:
 
 
 def _times(verdict: Verdict) -> Iterator[_Line]:
-    figures, network, given_us = verdict.deciding, verdict.network, verdict.deciding.available_us
-    uncertainty_us, margin_us = figures.uncertainty_us, figures.margin_corrected_us or 0.0
-    used_us, whole = _used_us(figures), _us(given_us, None)
-    whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
-    bias = f", {_us(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
-    yield "used", Sentence((f"{_us(used_us, uncertainty_us)} us of {whole}, {_percent(used_us / given_us)}{bias}",))
-    doubt = "" if uncertainty_us is None else f", +/- {_us(uncertainty_us, uncertainty_us)}"
-    reserve_us = given_us * network.profile.limits.reserve
-    reserve = f"; {_us(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
-    margin = f"{_us(abs(margin_us), uncertainty_us)} us{doubt}"
-    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{margin}{reserve}",))
+    yield from time_lines(verdict.deciding, verdict.network)
     yield "fastest period", _fastest(verdict)
 
 
@@ -279,7 +268,7 @@ def _fastest(verdict: Verdict) -> Sentence:
 def _rounded_up(verdict: Verdict, us: float) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not verdict.network.bus.periods.us:
-        scale = 10.0 ** _decimals(us, verdict.deciding.uncertainty_us)
+        scale = 10.0 ** time_decimals(us, verdict.deciding.uncertainty_us)
         us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
     return period(us)
 
@@ -308,7 +297,7 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
         meanings = change_meanings(verdict.network.bus)
         settings = settings_sentence(one.changes, meanings=meanings, quotes=False)
         left_us = one.figures.margin_corrected_us
-        left = "" if left_us is None else f", which leaves {_us(left_us, one.figures.uncertainty_us)} us"
+        left = "" if left_us is None else f", which leaves {time_text(left_us, one.figures.uncertainty_us)} us"
         yield name, joined(settings, Sentence((left,)), by="")
 
 
@@ -324,11 +313,11 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
     figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
     if figures.terms:
         largest = max(figures.terms, key=lambda term: plain(term.us))
-        us = _us(plain(largest.us), figures.uncertainty_us)
+        us = time_text(plain(largest.us), figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, {_percent(parts[0]['share'])} of the variance",))
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, {percent_text(parts[0]['share'])} of the variance",))
     if network.groups and figures.bias_us is None:
         (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
         uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
@@ -351,8 +340,10 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
     deciding = verdict.deciding
     for other in verdict.others:
         if contradicts(other.fits, deciding):
-            needed_us = _us(other.required_us, deciding.uncertainty_us)
-            words = f"says otherwise, {needed_us} us needed of {_us(other.available_us, None)}, but does not decide"
+            needed_us = time_text(other.required_us, deciding.uncertainty_us)
+            words = (
+                f"says otherwise, {needed_us} us needed of {time_text(other.available_us, None)}, but does not decide"
+            )
             yield f"{other.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in verdict.network.bus.safety.after_reset.items())
@@ -372,21 +363,3 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
         }
         for doubt in sorted(figures.doubts, key=lambda doubt: -float(doubt.us))
     ]
-
-
-def _percent(share: float) -> str:
-    return f"{share:.0%}".replace("%", " %")
-
-
-def _us(us: float, uncertainty_us: float | None) -> str:
-    """A time with as many digits as its uncertainty allows."""
-    return f"{us:.{_decimals(us, uncertainty_us)}f}"
-
-
-def _decimals(us: float, uncertainty_us: float | None) -> int:
-    """Decimals down to the first digit of the uncertainty; without one, for `_DIGITS` significant digits."""
-    if uncertainty_us and isfinite(uncertainty_us):
-        decimals = -floor(log10(uncertainty_us))
-    else:
-        decimals = _DIGITS - 1 - floor(log10(abs(us))) if us else 0
-    return min(max(0, decimals), _MOST_DECIMALS)
