@@ -223,10 +223,13 @@ def _when_full(load: float) -> str:
     return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
 
 
+_LOAD: Final = "the largest load of the bus, with the longest bits and frames,"
+
+
 def _load_words(network: Network) -> str:
     load, most = plain(_longest(network).load), network.profile.most_load
     over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
-    return f"the bus load is {load:.1%}, over {over}{_when_full(load)}"
+    return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
 
 
 def _pdos(network: Network) -> Number:
@@ -327,7 +330,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
         load, most = plain(_longest(subject.network).load), subject.network.profile.most_load
         yield RuleProblem(
-            "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
+            "limits.max_load", f"{_LOAD} is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )
 
 

@@ -182,7 +182,6 @@ def _verdict(verdict: Verdict) -> Record:
         "not_in_uncertainty": [part.key for part in verdict.left_out],
         "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
         "cheapest_change": change and _change_record(change),
-        "setting_change": verdict.setting and _change_record(verdict.setting),
         "fastest_period_us": verdict.fastest and verdict.fastest.us,
         "faster_with": verdict.best_register
         and {"changes": verdict.best_register.changes, "period_us": verdict.best_register.period_us},

@@ -24,10 +24,11 @@ from busplan.questions.base.sentences import (
     used_us,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
-from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure, cure_by_setting
+from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
+    GroupCapacity,
     after_reset,
     capacity_figures,
     figures,
@@ -88,8 +89,6 @@ class Verdict:
     or if no change is enough."""
     no_change: str
     """Why there is no change, if one was looked for."""
-    setting: Change | None = None
-    """A setting of the bus that mends what is wrong, too, where `change` is a longer period."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -143,7 +142,6 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,
         no_change=no_change,
-        setting=None if change is None else _setting(network, deciding, change),
     )
 
 
@@ -165,15 +163,6 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
         return None, mending.why
     after = figures(changed(target, mending.changes), model=now.timing_model)
     return Change(mending.changes, int(plain(target.nodes)), after), ""
-
-
-def _setting(network: Network, now: CapacityFigures, change: Change) -> Change | None:
-    """A setting of the bus that mends a network, where the change is a longer period."""
-    target = changed(network, {NODES: change.nodes}) if change.nodes != int(plain(network.nodes)) else network
-    values = cure_by_setting(target, instead_of=change.changes)
-    if values is None:
-        return None
-    return Change(values, change.nodes, figures(changed(target, values), model=now.timing_model))
 
 
 _Line = tuple[str, Sentence]
@@ -259,7 +248,8 @@ def _fastest(verdict: Verdict) -> Sentence:
         with_best = f"; {_rounded_up(verdict, best.period_us)} with {values}"
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
-        return Sentence((f"none as set{with_best}" if best else f"none: {why}",), "fails")
+        none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
+        return Sentence((f"none as set{with_best}" if best else none,), "fails")
     limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
     as_set = " as set" if best else ""
     return Sentence((f"{_rounded_up(verdict, fastest.us)}{as_set}{limited}{with_best}",))
@@ -277,35 +267,53 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
     """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     if verdict.all_well and verdict.has_room:
-        spare = {count.name: (count.safe_nodes or 0) - count.nodes for count in figures.counts}
-        rooms = (
-            f"{number} more {f'of {name}' if name else nouns(number, 'node')}"
-            for name, number in spare.items()
-            if number > 0
-        )
-        yield "room for", Sentence((listed([*rooms], "or"),))
+        spare = [(count, (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
+        rooms = [_more(count, number) for count, number in spare if number > 0]
+        yield "room for", Sentence((listed(rooms, "or"),))
         return
     if verdict.all_well and verdict.network.groups:
         yield "room for", Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
         if verdict.no_change:
-            yield label, Sentence((f"none: {verdict.no_change}",))
+            rest = _beside_limit(verdict, verdict.no_change)
+            why = verdict.no_change if rest is None else rest
+            yield label, Sentence((f"none: {why}" if why else "none",))
         return
-    # The cheaper for the machine first.
-    for name, one in zip((label, "or"), filter(None, (verdict.setting, change)), strict=False):
-        meanings = change_meanings(verdict.network.bus)
-        settings = settings_sentence(one.changes, meanings=meanings, quotes=False)
-        left_us = one.figures.margin_corrected_us
-        left = "" if left_us is None else f", which leaves {time_text(left_us, one.figures.uncertainty_us)} us"
-        yield name, joined(settings, Sentence((left,)), by="")
+    meanings = change_meanings(verdict.network.bus)
+    settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
+    left_us = change.figures.margin_corrected_us
+    left = "" if left_us is None else f", which leaves {time_text(left_us, change.figures.uncertainty_us)} us"
+    yield label, joined(settings, Sentence((left,)), by="")
+
+
+def _more(count: GroupCapacity, number: int) -> str:
+    """How many more nodes of a group, or of all, are shown to fit, and their axes."""
+    if count.name:
+        axes = (count.safe_axes or 0) - count.axes
+        return f"{number} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
+    axes = f", {plural(count.safe_axes, 'axis')}" if count.safe_axes else ""
+    return f"{number} more {nouns(number, 'node')}: {plural(count.safe_nodes or 0, 'node')}{axes} in all"
+
+
+def _beside_limit(verdict: Verdict, why: str) -> str | None:
+    """What a reason says beside the words of a limit that stand on the card already; None where it has other words."""
+    for words in verdict.broken_limits:
+        if why.startswith(words):
+            return why.removeprefix(words).strip(" ()")
+    return None
 
 
 def _buses(figures: CapacityFigures) -> Iterator[_Line]:
     """How many such buses would carry all nodes, where one is not shown to."""
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
-        yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
+        yield "buses", Sentence((f"{ceil(figures.nodes / most)} as set, of {plural(most, 'node')} or fewer",))
+    elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
+        yield (
+            "buses",
+            Sentence((f"no number: a single node is not shown to fit, limited by {figures.safe_limited_by}",)),
+        )
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:

@@ -63,7 +63,8 @@ class MachineOnKind(NamedTuple):
     curve: tuple[SafeAxes, ...]
     """The most axes over the period."""
     best: SettingForPeriod | None = None
-    """The setting, free to change, that makes `smallest` the smallest; the most axes are those with it or without."""
+    """The setting, free to change, that makes `smallest` the smallest; the most axes are those with it or without.
+    None on the profile's own kind."""
 
     @property
     def profile(self) -> Profile:
@@ -193,7 +194,7 @@ def compare(
     >>> import busplan
     >>> answer = busplan.compare("paper-4ms", buses=["ieee1394", "can"])
     >>> [(kind.figures.verdict, kind.safe.axes, round(kind.smallest.us)) for kind in answer.kinds]
-    [('fits', 52, 432), ('fits', 16, 2126)]
+    [('fits', 52, 553), ('fits', 16, 2126)]
     >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
@@ -240,7 +241,8 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
         assumed = (*tried, *(assumption for assumption in assumed if assumption.key not in needed))
         on_kind = changed(on_kind, needed)
     smallest = smallest_period(on_kind, with_limits=False)
-    best = best_register(on_kind, smallest)
+    # The profile's own kind is shown as it is set.
+    best = None if is_own else best_register(on_kind, smallest)
     if best is not None:
         smallest = smallest_period(changed(on_kind, best.changes), with_limits=False)
     rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))

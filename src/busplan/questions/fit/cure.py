@@ -35,7 +35,8 @@ MOST_RATIO: Final = 0.9
 _RATIO_STEPS: Final = 100
 _PERIOD_DIGITS: Final = 3
 """Significant digits of a period that is advised."""
-_DEFAULT_COSTS: Final = (Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
+_ASKED_FOR: Final = (Cost.PAYLOAD, Cost.NODES)
+"""Costs of what changes what the machine does, and so is free only where a plan is asked to."""
 _PAYLOADS: Final = tuple(f"{kind}_bytes{part}" for kind in TRANSACTION_KINDS for part in ("", "_per_axis"))
 
 
@@ -80,6 +81,10 @@ class Freedom(NamedTuple):
     cost: Cost
     keys: tuple[str, ...]
 
+    def is_meant(self, name: str) -> bool:
+        """Whether a name is its own, or one of its keys as a profile writes them."""
+        return name == self.name or name in self.keys
+
 
 class PlanStep(NamedTuple):
     """A step of a plan: what was freed, and the changes that came nearest."""
@@ -119,8 +124,7 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     network
         The network.
     names
-        Names of freedoms; None for the bus's registers, the slice ratio and the period, or for all of them in a network
-        without a cycle.
+        Names of freedoms, or keys that one of them changes; None for all but payload and nodes.
     kept
         Keys that were given a value, which stays.
 
@@ -132,23 +136,23 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     possible = freedoms(network)
     still = [freedom for freedom in possible if not set(freedom.keys) <= set(kept)]
     if names is None:
-        return tuple(freedom for freedom in still if freedom.cost in _DEFAULT_COSTS or not network.groups)
+        return tuple(freedom for freedom in still if freedom.cost not in _ASKED_FOR)
     kind = f"{network.profile.bus.kind} with groups" if network.profile.group else network.profile.bus.kind
     problems = [
         f"free {name}: there is nothing of that name to free on a bus of kind {kind}; there are "
-        f"{', '.join(freedom.name for freedom in possible)}"
+        f"{', '.join(freedom.name for freedom in possible)}, or their keys"
         for name in names
-        if name not in {freedom.name for freedom in possible}
+        if not any(freedom.is_meant(name) for freedom in possible)
     ]
     problems += [
         f"free {freedom.name}: {' and '.join(key for key in freedom.keys if key in kept)} was given a value, which is "
         "kept; give one of them"
         for freedom in possible
-        if freedom.name in names and freedom not in still
+        if any(map(freedom.is_meant, names)) and freedom not in still
     ]
     if problems:
         raise BusplanError(*problems)
-    return tuple(freedom for freedom in still if freedom.name in names)
+    return tuple(freedom for freedom in still if any(map(freedom.is_meant, names)))
 
 
 def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[PlanStep]:
@@ -344,23 +348,6 @@ def cure(network: Network) -> Cure:
     return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
 
 
-def cure_by_setting(network: Network, *, instead_of: Changes) -> Changes | None:
-    """The cheapest setting of the bus that alone mends a network, where its cure is a longer period; None if none does.
-
-    Parameters
-    ----------
-    network
-        The network.
-    instead_of
-        Its cure.
-    """
-    if PERIOD not in instead_of:
-        return None
-    settings = sorted(network.bus.settings(network), key=lambda setting: setting.cost)
-    trials = (values for setting in settings if setting.cost < Cost.PERIOD for values in setting.values)
-    return next((values for values in trials if _holds(network, values)), None)
-
-
 def stands_in_the_way(network: Network, step: PlanStep) -> Need:
     """The constraint that a step does not hold, with its words."""
     after = changed(network, step.changes)
@@ -370,7 +357,7 @@ def stands_in_the_way(network: Network, step: PlanStep) -> Need:
 
 
 def changeable(network: Network) -> tuple[str, ...]:
-    """Default freedoms of a plan, in words, the cheapest first."""
+    """What a plan may change unasked, in words, the cheapest first."""
     return tuple(freedom.label for freedom in freed(network))
 
 

@@ -166,8 +166,8 @@ def plan(
         Other values to keep by dotted key, in the key's unit: {"payload.read_bytes": 16}. `KeyChanges` have options
         besides, which errors name.
     free
-        Names of what may be changed, as gap_count, slice_ratio, responses, payload, period and nodes; by default the
-        registers of the bus, the slice ratio to 0.9, and the period.
+        Names of what may be changed, as gap_count, slice_ratio, responses, payload, period and nodes, or their keys; by
+        default all but payload and nodes.
 
     Returns
     -------
