@@ -21,6 +21,7 @@ from busplan.forms.blocks import (
     Report,
     SectionLink,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
