@@ -241,12 +241,12 @@ def _deadline_sentence(answer: LatencyAnswer) -> Iterator[Sentence]:
     is_broken = any(
         limit.of_deadlines and limit.key in deciding.exceeded for limit in bus.limits for deciding in answer.deciding
     )
-    why = ""
     state: State = "fails" if late else "neutral"
+    why = f"; not shown: {'; '.join(not_shown)}" if not_shown else ""
     if not_shown and not is_broken:
-        is_kept, why, state = "NOT SHOWN that every message keeps its deadline", f": {'; '.join(not_shown)}", "warns"
+        is_kept, state = "NOT SHOWN that every message keeps its deadline", "warns"
     time = "has no worst-case response time" if us is None else f"takes up to {us:g} us of {deadline_us:g}"
-    yield Sentence((f"{is_kept} by the {model} model{why}; {_name(latest)} {time}.",), state)
+    yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}{why}.",), state)
 
 
 def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:

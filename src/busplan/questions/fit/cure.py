@@ -284,12 +284,15 @@ def _holds(network: Network, change: Changes | None) -> bool:
 
 
 def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
-    """The change to payloads of so many bytes or less; empty where they are, None where no payload would be left."""
+    """The change to payloads of so many bytes or less; empty where they are, None where none would be left or be cut."""
     changes: dict[str, Value] = {}
     for group, kind in product(profile.node_groups, TRANSACTION_KINDS):
         over, (key, bytes_cut) = int(group.bytes_of(kind)) - most_bytes, _cut(group, kind)
         if over > 0 and key not in kept:
-            changes[key] = getattr(group.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+            now = getattr(group.payload, key.rpartition(".")[2])
+            if now is None:  # it is given by the bytes of each PDO
+                return None
+            changes[key] = now - ceil(over / bytes_cut)
     return changes if all(int(value) > 0 for value in changes.values()) else None
 
 
