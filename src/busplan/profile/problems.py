@@ -210,7 +210,7 @@ def _example(model: type[BaseModel]) -> str:
     return f"{{{', '.join(keys)}}}"
 
 
-_REMOVED: Final = {
+_REMOVED: Final[dict[tuple[str, ...], str]] = {
     ("bus", "timing_model"): "no longer a key: the model that decides always comes first; delete the line, and use "
     "--timing-model to show another",
 }

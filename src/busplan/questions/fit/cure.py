@@ -284,7 +284,7 @@ def _holds(network: Network, change: Changes | None) -> bool:
 
 
 def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
-    """The change to payloads of so many bytes or less; empty where they are, None where none would be left or be cut."""
+    """The change to payloads of so many bytes or less; empty where they are, None where that cannot be."""
     changes: dict[str, Value] = {}
     for group, kind in product(profile.node_groups, TRANSACTION_KINDS):
         over, (key, bytes_cut) = int(group.bytes_of(kind)) - most_bytes, _cut(group, kind)
