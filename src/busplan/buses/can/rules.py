@@ -223,7 +223,7 @@ def _when_full(load: float) -> str:
     return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
 
 
-_LOAD: Final = "the largest load of the bus, with the longest bits and frames,"
+_LOAD: Final = "the bus load with the longest bits"
 
 
 def _load_words(network: Network) -> str:
