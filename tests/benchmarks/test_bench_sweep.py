@@ -37,7 +37,7 @@ ALONE = 100
 @pytest.fixture(scope="module")
 def profile() -> busplan.Profile:
     execution = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}
-    return busplan.load_profile("paper-4ms", changes={"node.execution": execution, "bus.timing_model": "standard"})
+    return busplan.load_profile("paper-4ms", changes={"node.execution": execution})
 
 
 def seconds(run: Callable[[], object]) -> float:

@@ -174,7 +174,6 @@ def test_defaults_are_those_of_the_reference() -> None:
     loaded = profile()
     assert loaded.description == ""
     assert (loaded.bus.gap_count, loaded.bus.max_hops, loaded.bus.cable_length_m) == (63, None, 4.5)
-    assert loaded.bus.timing_model == "standard"
     assert (loaded.cycle.slice_ratio, loaded.cycle.nonperiodic_us) == (0.5, 0.0)
     assert (loaded.cycle.sync.ping_us, loaded.cycle.sync.ping_per_node_us) == (0.3, 0.1)
     assert loaded.payload.overhead_bytes == 20

@@ -21,7 +21,7 @@ def make_profile(**changes: Any) -> busplan.Profile:
     data: dict[str, Any] = {
         "schema_version": 1,
         "name": "test",
-        "bus": {"kind": "ieee1394", "speed": "S400", "gap_count": 63, "nodes": 2, "timing_model": "standard"},
+        "bus": {"kind": "ieee1394", "speed": "S400", "gap_count": 63, "nodes": 2},
         "cycle": {"period_us": 4000.0, "slice_ratio": 0.5, "sync": {}},
         "payload": {"read_bytes": 12, "write_bytes": 12},
         "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}},
@@ -46,7 +46,6 @@ OF_ALL: dict[str, st.SearchStrategy[Any]] = {
     "bus__nodes": st.integers(1, 80),
     "bus__max_hops": st.one_of(st.none(), st.integers(1, 20)),
     "bus__cable_length_m": st.sampled_from([0.5, 2.0, 4.5]),
-    "bus__timing_model": st.sampled_from(["paper", "standard"]),
     "cycle__period_us": st.floats(1.0, 50_000.0),
     "cycle__slice_ratio": st.floats(0.01, 1.0),
     "cycle__nonperiodic_us": st.one_of(st.just(0.0), st.floats(0.0, 500.0)),

@@ -52,9 +52,7 @@ class Bus(ABC):
     also_called: ClassVar[tuple[str, ...]] = ()
     """Further names that users type; case, spaces and punctuation do not count."""
     timing_models: ClassVar[tuple[TimingModel, ...]]
-    """Timing models in the order in which reports show them."""
-    deciding_model: ClassVar[str]
-    """The conservative timing model, which always gives the verdict."""
+    """Timing models in the order of reports. The first is the conservative one, which always gives the verdict."""
     figures: ClassVar[BusFigures]
     safety: ClassVar[Safety] = Safety()
     limits: ClassVar[tuple[Limit, ...]]
@@ -84,6 +82,11 @@ class Bus(ABC):
     """Modules beside its own that a single command imports: `evidence` with `FUNCTIONS`, `emulated` with `EMULATOR`."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
+
+    @property
+    def deciding_model(self) -> str:
+        """Name of the timing model that gives the verdict."""
+        return self.timing_models[0].name
 
     def profile_model(self) -> "type[Profile]":
         """Pydantic model of its profiles: `PROFILE` of module `section`, imported only here since it loads pydantic."""

@@ -116,6 +116,9 @@ class Limit(NamedTuple):
     is_slow: bool = False
     """Whether its value and period are slow to compute, and of plain numbers: it is evaluated last."""
 
+    of_deadlines: bool = False
+    """Whether it must be kept for messages to be shown to keep their deadlines."""
+
     @property
     def nominal(self) -> "Limit":
         """The same limit without uncertainty."""

@@ -247,8 +247,8 @@ def timeline_command(
         Show the N-th cycle, from 1, of groups with rates of their own (every = n, on CAN and EtherCAT); beyond their
         common multiple the cycles repeat. [default: the fullest, which the verdict is for]
     --timing-model MODEL
-        Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. [default: the profile's
-        bus.timing_model, where it is applicable]
+        Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. [default: the one
+        that decides]
     """
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
@@ -299,7 +299,8 @@ def explain_command(
         equation, as "(11)"; a label of a table, as arbitration; or a transaction, a message or a group of nodes, for
         its latency. [default: what the verdict rests on, and a list of all figures]
     --timing-model MODEL|both
-        Timing model; bias and uncertainty have only the one that decides. [default: the profile's bus.timing_model]
+        Timing model; bias and uncertainty have only the one that decides. [default: the one that decides, or the first
+        that has the figure]
     --transaction NAME
         For a figure of latency: the name of the transaction or message, as read, SYNC or loop. A wrong name lists the
         right ones. [default: all]

@@ -94,9 +94,10 @@ def plan_command(
         Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes. [default: the axes of
         the nodes]
     --free NAMES
-        Settings that may change, with commas, in the order of their cost: gap_count, slice_ratio, responses (reads
-        concatenated, writes unified), schedule (where the bus has one), payload (less), period, nodes (fewer).
-        [default: gap_count,slice_ratio,period]
+        Settings that may change, with commas: keys, as cycle.slice_ratio, or names. On every bus slice_ratio, payload
+        (less), period and nodes (fewer); on IEEE 1394 gap_count, responses (reads concatenated, writes unified) and
+        schedule; on CAN pdo_per, bit_rate, data_bit_rate, identifier_bits and access; on EtherCAT sync_shift; on SERCOS
+        III timing_method; on polled buses return_delay, bit_rate and requests. [default: all but payload and nodes]
     --apply
         Write the recommended values into PROFILE, a file; comments and layout stay as they are.
     --force

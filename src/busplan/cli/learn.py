@@ -88,12 +88,12 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
 
     records, chapters = [], []
     for profile in profiles:
-        nodes, model = sum(group.nodes for group in profile.node_groups), profile.bus.timing_model
+        nodes = sum(group.nodes for group in profile.node_groups)
         description = " ".join(profile.description.split())
         period_us: Any = profile.cycle.period_us if profile.has_cycle else None
-        figures = {"name": profile.name, "nodes": nodes, "period_us": period_us, "timing_model": model}
+        figures = {"name": profile.name, "nodes": nodes, "period_us": period_us}
         records.append({**figures, "description": description})
-        words = f"{{}}: {{}} {nouns(nodes, 'node')} at {{}}, {model} model leads"
+        words = f"{{}}: {{}} {nouns(nodes, 'node')} at {{}}"
         title = sentence(words, Code(profile.name), count_value(nodes, "nodes"), period_value(period_us))
         chapters.append(Chapter(title, (Sentence((description,)),)))
     return Report(Sentence(("Shipped profiles",)), chapters, document("profiles", profiles=records), records)

@@ -23,9 +23,9 @@ from busplan.profile.edit import short_text
 from busplan.questions.base.inputs import Path
 from busplan.questions.fit.certainty import available_us, fits_in
 from busplan.questions.fit.circle_setup import path_steps, refusals
+from busplan.questions.fit.cure import changeable, cure
 from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
-from busplan.questions.plan.search import changeable, cure
 from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile

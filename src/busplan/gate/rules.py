@@ -22,9 +22,10 @@ from busplan.forms.blocks import (
     TableRow,
 )
 from busplan.questions.base.sentences import document, fields
-from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in
+from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME
 from busplan.questions.fit.figures import limits_behind
 from busplan.questions.fit.inputs import heavy_assumptions
+from busplan.questions.fit.needs import missed_limits
 from busplan.sections.cycle import TableExecution
 
 
@@ -59,33 +60,34 @@ def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The slice is fuller than [limits] allows."""
-    limit, deciding = subject.profile.limits.max_utilisation, subject.deciding
-    if limit is not None and not (limit and fits_in(deciding.required_us / limit, available_us=deciding.available_us)):
+    limit, deciding, key = subject.profile.limits.max_utilisation, subject.deciding, "limits.max_utilisation"
+    if limit is not None and any(missed.key == key for missed in missed_limits(subject.network)):
         used, allowed = told_apart(100 * deciding.utilisation, 100 * limit)
         words = f"{used}% of the slice is used, {allowed}% allowed"
-        yield RuleProblem("limits.max_utilisation", words, *subject.cure())
+        yield RuleProblem(key, words, *subject.cure())
 
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further nodes than [limits] requires."""
-    least = subject.profile.limits.min_spare_nodes
-    if least is None:
-        return
-    for counts in subject.counts():
-        spare = (counts.safe_nodes or 0) - counts.nodes
-        if spare < least:
-            yield RuleProblem("limits.min_spare_nodes", _spare(counts, spare, least), *_room(subject, counts))
+    yield from _too_little_room(subject, "nodes")
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further axes than [limits] requires."""
-    least = subject.profile.limits.min_spare_axes
+    yield from _too_little_room(subject, "axes")
+
+
+def _too_little_room(subject: RuleSubject, what: str) -> Iterator[RuleProblem]:
+    """The groups that have less room than [limits] asks for nodes or axes."""
+    key = f"limits.min_spare_{what}"
+    least = getattr(subject.profile.limits, f"min_spare_{what}")
     if least is None:
         return
-    for counts in subject.counts():
-        spare = (counts.safe_axes or 0) - counts.axes
-        if counts.axes and spare < least:
-            yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, least), *_room(subject, counts))
+    groups = {missed.group for missed in missed_limits(subject.network) if missed.key == key}
+    for counts in subject.counts() if groups else ():
+        if counts.name in groups:
+            spare = (getattr(counts, f"safe_{what}") or 0) - getattr(counts, what)
+            yield RuleProblem(key, _spare(counts, spare, least), *_room(subject, counts))
 
 
 def _spare(counts: Any, spare: int, least: int) -> str:

@@ -17,7 +17,7 @@ from busplan.profile.kinds import dotted_keys, flat, models_of, named_tables
 from busplan.sections.base import TRANSACTION_KINDS
 from busplan.sections.profile import Profile
 
-_KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
+_KIND, _NODES = "kind", "nodes"
 _SIZES = ("read_bytes", "write_bytes")
 _EVERY = "every"
 """Rate of a group, on kinds that have several."""
@@ -155,8 +155,7 @@ def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
     common = _part(data, [Profile], "", rest)
     nodes = data["bus"].get(_NODES)
     common["bus"] = {} if nodes is None else {_NODES: nodes}
-    kept = {f"bus.{key}" for key in (_NODES, _SHOWN_FIRST)}
-    return common, tuple(key for key in rest if key not in kept)
+    return common, tuple(key for key in rest if key != f"bus.{_NODES}")
 
 
 def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: str, rest: list[str]) -> TomlTable:

@@ -201,8 +201,8 @@ _OF_VERDICT: Final = ("limits.reserve",)
 """Keys of these sections that a verdict depends on."""
 _OF_GROUP: Final = ("name", "execution.kind")
 """Keys of a group that say how the others are read."""
-_CHANGE_NO_FIGURE: Final = ("bus.kind", "bus.timing_model", "node.execution.kind")
-"""Keys that say how the others are read, or what is shown first."""
+_CHANGE_NO_FIGURE: Final = ("bus.kind", "node.execution.kind")
+"""Keys that say how the others are read."""
 _OF_CYCLE: Final = ("cycle.", "node.", "payload.", "bus.nodes", *_OF_VERDICT)
 """Beginnings of keys that no figure of a network without a cycle depends on."""
 

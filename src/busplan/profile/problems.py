@@ -210,8 +210,17 @@ def _example(model: type[BaseModel]) -> str:
     return f"{{{', '.join(keys)}}}"
 
 
+_REMOVED: Final[dict[tuple[str, ...], str]] = {
+    ("bus", "timing_model"): "no longer a key: the model that decides always comes first; delete the line, and use "
+    "--timing-model to show another",
+}
+"""Keys of earlier profiles, with what to do instead."""
+
+
 def _unknown(path: KeyPath, section: type[BaseModel], model: type[BaseModel]) -> str:
     name, names = str(path[-1]), list(section.model_fields)
+    if removed := _REMOVED.get(tuple(map(str, path))):
+        return removed
     for kind, table in _kinds_beside(model, section).items():
         if name in table.model_fields:
             own = _word_of_kind(section)

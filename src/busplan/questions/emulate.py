@@ -3,15 +3,19 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
 from busplan import __version__
 from busplan.buses import kind_named, kind_names
 from busplan.buses.emulation import TIMES, Emulation, Emulator, Fault
+from busplan.buses.network import Network
 from busplan.english import did_you_mean, listed, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Code, Report, Sentence
+from busplan.progress import ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, finite, load_network, whole, with_its_constants
 from busplan.questions.base.sentences import document, fields, with_profile
@@ -40,6 +44,8 @@ class EmulateAnswer(Answer):
         Seed of its random numbers.
     faults
         Value of each fault, by name: how often, or how late [us].
+    inside
+        Faults that lie inside the plan, so that `measured` finds nothing beyond it.
     """
 
     profile: Profile
@@ -48,6 +54,7 @@ class EmulateAnswer(Answer):
     duration_us: float
     seed: int
     faults: Mapping[str, float]
+    inside: tuple[str, ...] = ()
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         recordings = dict.fromkeys(emulator_of(self.profile).endings, lambda: self.content)
@@ -61,8 +68,14 @@ class EmulateAnswer(Answer):
         records = []
         for fault, value in ((fault_named(emulator, key), value) for key, value in self.faults.items()):
             often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
-            lines.append(Sentence((f"{fault.name}: {fault.words}, {often}; measured shows {fault.shown_as}.",)))
-            records.append({"value": value, **fields(fault, "name", "unit", "shown_as")})
+            is_inside = fault.name in self.inside
+            shown = (
+                f"the plan allows this, so {fault.shown_as} is within"
+                if is_inside
+                else f"measured shows {fault.shown_as}"
+            )
+            lines.append(Sentence((f"{fault.name}: {fault.words}, {often}; {shown}.",)))
+            records.append({"value": value, "is_inside_plan": is_inside, **fields(fault, "name", "unit", "shown_as")})
         content = document("emulate", profile=name, **fields(self, "cycles", "duration_us", "seed"), faults=records)
         return Report(Sentence(("Emulated ", Code(name))), lines, content, with_profile(name, records))
 
@@ -119,7 +132,22 @@ def emulate(
     random = Random(whole(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
     content = emulator.emulated(network, Emulation(number, random, values, origin))
-    return EmulateAnswer(network.profile, content, number, number * period_us, seed, MappingProxyType(values))
+    inside = _inside(network, emulator, content, values)
+    return EmulateAnswer(network.profile, content, number, number * period_us, seed, MappingProxyType(values), inside)
+
+
+def _inside(network: Network, emulator: Emulator, content: bytes, faults: Mapping[str, float]) -> tuple[str, ...]:
+    """Faults whose figure of the recording is within the plan."""
+    if not faults:
+        return ()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"recording{emulator.endings[0]}"
+        path.write_bytes(content)
+        recorded = network.bus.recorded(network, path, share=1.0, channel=None, progress=ignored)
+    within = {figure.quantity for figure in recorded.figures if figure.verdict == "within"}
+    beyond = {figure.quantity for figure in recorded.figures if figure.verdict not in ("within", None)}
+    shown = {name: fault_named(emulator, name).shown_as for name in faults}
+    return tuple(name for name, figure in shown.items() if figure in within - beyond)
 
 
 def emulator_of(profile: Profile) -> Emulator:

@@ -16,6 +16,7 @@ from busplan.forms.blocks import (
     Record,
     Report,
     Sentence,
+    State,
     Table,
     TableColumn,
     TableRow,
@@ -35,10 +36,12 @@ from busplan.questions.base.sentences import (
     FigureColumn,
     document,
     execution_sentence,
+    fields,
     figure_table,
     warning_sentences,
     with_profile,
 )
+from busplan.questions.fit.figures import FitFigures, figures
 from busplan.questions.fit.network import with_payloads
 from busplan.sections.cycle import TableExecution
 from busplan.sections.profile import Profile
@@ -69,11 +72,14 @@ class LatencyAnswer(Answer):
         The network with each payload; without payloads as the profile has it.
     tables
         The transactions of each of these networks, each under every timing model.
+    deciding
+        The verdict on each of these networks.
     """
 
     profile: Profile
     networks: tuple[Network, ...]
     tables: tuple[tuple[Transaction, ...], ...]
+    deciding: tuple[FitFigures, ...]
 
     @property
     def transactions(self) -> tuple[Transaction, ...]:
@@ -89,10 +95,12 @@ class LatencyAnswer(Answer):
     def report(self) -> Report:
         """The answer in blocks."""
         name, records = self.profile.name, _records(self.transactions)
+        # Other payloads are those of another machine.
+        verdict = fields(self.deciding[0], "verdict", "exceeded", "not_shown") if len(self.deciding) == 1 else {}
         return Report(
             Sentence(("Latency of ", Code(name))),
             tuple(_blocks(self)),
-            document("latency", profile=name, transactions=records),
+            document("latency", profile=name, **verdict, transactions=records),
             with_profile(name, records),
         )
 
@@ -150,7 +158,8 @@ def latency(
         _require_execution(network.profile, sizes)
         networks = [with_payloads(network, [(size, size)] * len(network.profile.node_groups)) for size in sizes]
     tables = tuple(_transactions(variant, models) for variant in networks)
-    return LatencyAnswer(network.profile, tuple(networks), tables)
+    deciding = tuple(figures(variant, model=variant.bus.deciding_model) for variant in networks)
+    return LatencyAnswer(network.profile, tuple(networks), tables, deciding)
 
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
@@ -232,8 +241,21 @@ def _deadline_sentence(answer: LatencyAnswer) -> Iterator[Sentence]:
     us, deadline_us = (latest.phases[key] for key in keys)
     misses = "misses its deadline" if late == 1 else "miss their deadlines"
     is_kept = f"{late} of {len(due)} messages {misses}" if late else "Every message keeps its deadline"
+    not_shown = dict.fromkeys(
+        limit.words(network)
+        for network, deciding in zip(answer.networks, answer.deciding, strict=True)
+        for limit in bus.limits
+        if limit.of_deadlines and limit.key in (deciding.not_shown or ())
+    )
+    is_broken = any(
+        limit.of_deadlines and limit.key in deciding.exceeded for limit in bus.limits for deciding in answer.deciding
+    )
+    state: State = "fails" if late else "neutral"
+    why = f"; not shown: {'; '.join(not_shown)}" if not_shown else ""
+    if not_shown and not is_broken:
+        is_kept, state = "NOT SHOWN that every message keeps its deadline", "warns"
     time = "has no worst-case response time" if us is None else f"takes up to {us:g} us of {deadline_us:g}"
-    yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}.",), "fails" if late else "neutral")
+    yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}{why}.",), state)
 
 
 def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:

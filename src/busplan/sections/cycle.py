@@ -191,13 +191,12 @@ SliceRatio = Annotated[
 
 
 class BusSection(Extended):
-    """Section [bus]. Every kind of bus has `nodes` and `timing_model`, where they belong among its own keys."""
+    """Section [bus]. Every kind of bus has `nodes`, where it belongs among its own keys."""
 
     kind: str = Field(description="Kind of bus", examples=["ieee1394"])
 
     if TYPE_CHECKING:
         nodes: int | None
-        timing_model: str
 
 
 class CycleSection(Extended):

@@ -126,7 +126,7 @@ def test_a_difference_is_signed_and_a_share_is_of_the_size_of_a(make: Make) -> N
 
 def test_only_the_models_asked_for_and_always_the_verdict(make: Make) -> None:
     # 500 us: the paper's timing carries four nodes, 399.4 us; three are shown to fit, 424.4 us, and four need 565.4.
-    a = make(cycle__period_us=1000.0, bus__nodes=3, bus__timing_model="paper")
+    a = make(cycle__period_us=1000.0, bus__nodes=3)
     b = busplan.load_profile(a, changes={"bus.nodes": 4})
     found = busplan.diff(a, b, timing_model=["paper"])
     assert {one.part for one in found.figures} == {"plan", "paper"}

@@ -55,8 +55,6 @@ def text(a: busplan.Profile, changes: dict[str, object]) -> list[str]:
             {"payload.overhead_bytes": 24},
             "a.toml (A) fits, b.toml (B) fits; B is worse in 10 figures: margin (paper), utilisation (paper), ",
         ),
-        # The verdict is by the standard in both.
-        ({"bus.timing_model": "standard"}, "a.toml (A) fits, b.toml (B) fits; no figure is better or worse."),
         ({}, "a.toml (A) fits, b.toml (B) fits; every key has the same value."),
     ],
 )
@@ -132,7 +130,6 @@ def test_the_document_holds_both_sides_in_full(paper: busplan.Profile) -> None:
     assert document["a"] == {
         "argument": "a.toml",
         "profile": "paper-1ms",
-        "timing_model": "paper",
         "verdict": "fits",
         "missed_limits": [],
     }

@@ -81,7 +81,6 @@ class Can(Bus):
         ),
         TimingModel(NONE, "no stuff bits"),
     )
-    deciding_model = WORST
     figures = FIGURES
     limits = LIMITS
     rules = RULES

@@ -223,10 +223,13 @@ def _when_full(load: float) -> str:
     return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
 
 
+_LOAD: Final = "the bus load with the longest bits"
+
+
 def _load_words(network: Network) -> str:
     load, most = plain(_longest(network).load), network.profile.most_load
     over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
-    return f"the bus load is {load:.1%}, over {over}{_when_full(load)}"
+    return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
 
 
 def _pdos(network: Network) -> Number:
@@ -295,6 +298,7 @@ LIMITS: Final = (
         perhaps=_assumed_periods,
         way_out="give message.NAME.period_us as it is known",
         place="message",
+        of_deadlines=True,
     ),
     Limit(
         "senders",
@@ -304,6 +308,7 @@ LIMITS: Final = (
         perhaps=lambda network: len(_unknown_senders(network)),
         way_out="give message.NAME.sender",
         place="bus.queue",
+        of_deadlines=True,
     ),
     Limit(
         "deadline",
@@ -315,6 +320,7 @@ LIMITS: Final = (
         period=lambda limit, network: _kept_from_us(network, is_shown=limit.perhaps is None),
         has_rule=True,
         is_slow=True,
+        of_deadlines=True,
     ),
 )
 
@@ -324,7 +330,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
         load, most = plain(_longest(subject.network).load), subject.network.profile.most_load
         yield RuleProblem(
-            "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
+            "limits.max_load", f"{_LOAD} is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )
 
 

@@ -5,7 +5,6 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from busplan.buses.can.cycle import WORST, TimingModelName
 from busplan.buses.can.equations import (
     LEAST_BIT_RATE,
     MAX_IDENTIFIER,
@@ -131,11 +130,6 @@ class CanBus(BusSection):
         default=None,
         description="Errors that may come at once, with as many periods to the next; without it 1",
         examples=[3],
-    )
-    timing_model: TimingModelName = Field(
-        default=WORST,
-        description="Timing model whose figures lead the tables; the verdict is always by worst-stuffing",
-        examples=[WORST],
     )
 
     def _problems(self) -> Iterator[Problem]:

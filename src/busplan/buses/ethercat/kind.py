@@ -199,7 +199,6 @@ class Ethercat(Bus):
         TimingModel(LAST_BYTE, "until the last byte of the last frame is back at the master"),
         TimingModel(VENDORS, "as vendors count: sending, propagation, and reception of the last frame"),
     )
-    deciding_model = LAST_BYTE
     figures = FIGURES
     limits = LIMITS
     rules = RULES

@@ -5,7 +5,6 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field, field_validator
 
-from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
 from busplan.buses.ethercat.equations import (
     SEPARATE,
     Master,
@@ -102,11 +101,6 @@ class EthercatBus(BusSection):
         default="spread",
         description="Groups with every > 1: spread evenly over cycles, or together in one",
         examples=["together"],
-    )
-    timing_model: TimingModelName = Field(
-        default=LAST_BYTE,
-        description="Timing model whose figures lead the tables; the verdict is always by last-byte",
-        examples=[LAST_BYTE],
     )
 
     @property

@@ -109,7 +109,7 @@ _NODES_EQ11: Final = Figure(
     "N_11",
     by(eq.published_nodes),
     "number of nodes as published, at the profile's own N",
-    "nodes N as published",
+    "nodes by the paper's (11)",
     "nodes",
     decimals=2,
 )

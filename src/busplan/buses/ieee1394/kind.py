@@ -123,10 +123,9 @@ class Ieee1394(Bus):
     title = "IEEE 1394"
     also_called = ("FireWire", "1394")
     timing_models = (
-        TimingModel("paper", "the paper's equations as published"),
         TimingModel("standard", "the standard's clock and packets, and the gaps as the bus runs them"),
+        TimingModel("paper", "the paper's equations as published"),
     )
-    deciding_model = "standard"
     figures = FIGURES
     safety = Safety("gap count", GAP_COUNT_SAFE, {"bus.gap_count": MAX_GAP_COUNT})
     limits = LIMITS

@@ -10,7 +10,6 @@ from busplan.buses.ieee1394.constants import (
     Speed,
     c,
 )
-from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import (
@@ -74,11 +73,6 @@ class Ieee1394Bus(BusSection):
         description="Root, which grants arbitration; without it any node may be the root, so that arbitration always "
         "counts the hops of the whole chain",
         examples=["host"],
-    )
-    timing_model: TimingModelName = Field(
-        default="standard",
-        description="Timing model whose figures lead the tables; the verdict is always by standard",
-        examples=["standard"],
     )
     cycle_master: bool = Field(
         default=True,

@@ -118,7 +118,6 @@ class Polled(Bus):
         TimingModel(STANDARD, "answers midway between typical and longest; U reaches to both"),
         TimingModel(TYPICAL, "answers as typical nodes give them, as vendors' rules count"),
     )
-    deciding_model = STANDARD
     figures = FIGURES
     limits = LIMITS
     starter = Starter(

@@ -5,7 +5,6 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from busplan.buses.polled.cycle import STANDARD, TimingModelName
 from busplan.buses.polled.protocols import BitTimes, Protocol, ProtocolName, Requests, Tolerance, protocol_of
 from busplan.sections.base import Count, Problem, TimeUs
 from busplan.sections.cycle import BusSection
@@ -78,11 +77,6 @@ class PolledBus(BusSection):
         default=None,
         description="How long the master waits for an answer that does not come; of PROFIBUS without it T_SL [us]",
         examples=[2000],
-    )
-    timing_model: TimingModelName = Field(
-        default=STANDARD,
-        description="Timing model whose figures lead the tables; the verdict is always by standard",
-        examples=[STANDARD],
     )
 
     def _problems(self) -> Iterator[Problem]:

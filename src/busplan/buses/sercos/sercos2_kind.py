@@ -53,7 +53,6 @@ class Sercos2(SercosBus):
         TimingModel(WORST, "a stuff bit after every five bits, the most there can be"),
         TimingModel(NONE, "no stuff bits"),
     )
-    deciding_model = WORST
     figures = FIGURES
     limits = LIMITS
     rules = (RULES["BP151"],)

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from busplan.buses.sercos.sercos2 import WORST, DataRate, TimingModelName, c
+from busplan.buses.sercos.sercos2 import DataRate, c
 from busplan.buses.sercos.shared import MOST_PIPELINE
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
@@ -45,11 +45,6 @@ class Sercos2Bus(BusSection):
         description="Cycles from feedback to the command computed from it, for a loop on the host; 0: the master "
         "computes within turnaround_us",
         examples=[2],
-    )
-    timing_model: TimingModelName = Field(
-        default=WORST,
-        description="Timing model whose figures lead the tables; the verdict is always by worst-stuffing",
-        examples=[WORST],
     )
 
 

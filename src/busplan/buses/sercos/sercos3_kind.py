@@ -72,7 +72,6 @@ class Sercos3(SercosBus):
         TimingModel(WINDOW, "telegrams, jitter, master and devices, and the ring delay where the method has it"),
         TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
     )
-    deciding_model = WINDOW
     figures = FIGURES
     limits = LIMITS
     rules = (RULES["BP141"],)

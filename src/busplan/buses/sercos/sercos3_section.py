@@ -10,7 +10,6 @@ from busplan.buses.sercos.sercos3 import (
     Version,
     c,
 )
-from busplan.buses.sercos.sercos3_cycle import WINDOW, TimingModelName
 from busplan.buses.sercos.shared import MOST_PIPELINE
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
@@ -76,11 +75,6 @@ class Sercos3Bus(BusSection):
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it, for a loop on the host",
         examples=[2],
-    )
-    timing_model: TimingModelName = Field(
-        default=WINDOW,
-        description="Timing model whose figures lead the tables; the verdict is always by window",
-        examples=[WINDOW],
     )
 
 

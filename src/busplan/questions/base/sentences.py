@@ -1,6 +1,7 @@
 """Sentences and documents that several questions share."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION, Figure
@@ -129,6 +130,55 @@ def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
     """The corrected margin under the model that decides, with its uncertainty if that is known."""
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
+
+
+def time_lines(figures: FitFigures, network: Network) -> Iterator[tuple[str, Sentence]]:
+    """How much of its slice a cycle uses and leaves free, under the model that decides: labels and words."""
+    given_us, uncertainty_us, margin_us = (
+        figures.available_us,
+        figures.uncertainty_us,
+        figures.margin_corrected_us or 0.0,
+    )
+    used, whole = used_us(figures), time_text(given_us, None)
+    whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
+    bias = f", {time_text(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
+    words = f"{time_text(used, uncertainty_us)} us of {whole}, {percent_text(used / given_us)}{bias}"
+    yield "used", Sentence((words,))
+    doubt = "" if uncertainty_us is None else f", +/- {time_text(uncertainty_us, uncertainty_us)}"
+    reserve_us = given_us * network.profile.limits.reserve
+    reserve = f"; {time_text(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
+    free = f"{time_text(abs(margin_us), uncertainty_us)} us{doubt}"
+    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{free}{reserve}",))
+
+
+def used_us(figures: FitFigures) -> float:
+    """Time that a cycle takes, with the bias of the model [us]."""
+    return figures.available_us - (figures.margin_corrected_us or 0.0)
+
+
+_DIGITS: Final = 3
+"""Significant digits of a time whose uncertainty is unknown."""
+_MOST_DECIMALS: Final = 6
+"""Most decimals of a time in us: below a picosecond there is only float rounding."""
+
+
+def percent_text(share: float) -> str:
+    """A share as a percentage without decimals."""
+    return f"{share:.0%}".replace("%", " %")
+
+
+def time_text(us: float, uncertainty_us: float | None) -> str:
+    """A time with as many digits as its uncertainty allows."""
+    return f"{us:.{time_decimals(us, uncertainty_us)}f}"
+
+
+def time_decimals(us: float, uncertainty_us: float | None) -> int:
+    """Decimals down to the first digit of the uncertainty; without one, for `_DIGITS` significant digits."""
+    if uncertainty_us and isfinite(uncertainty_us):
+        decimals = -floor(log10(uncertainty_us))
+    else:
+        decimals = _DIGITS - 1 - floor(log10(abs(us))) if us else 0
+    return min(max(0, decimals), _MOST_DECIMALS)
 
 
 def safety_record(figures: FitFigures, network: Network) -> Record:

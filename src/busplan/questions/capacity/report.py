@@ -28,7 +28,6 @@ from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.verdict import Change, Verdict, card, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS
-from busplan.questions.fit.network import leading_model
 
 
 def capacity_report(answer: CapacityAnswer) -> Report:
@@ -111,13 +110,12 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
 
 
 def _columns(answer: CapacityAnswer) -> Iterator[FigureColumn]:
-    """A column for each period and timing model, the profile's own model first."""
-    network = answer.verdicts[0].network
-    leading, deciding = leading_model(network), network.bus.deciding_model
+    """A column for each period and timing model, the model that decides first."""
+    deciding = answer.verdicts[0].network.bus.deciding_model
     for results in answer.periods:
         several = len(answer.periods) > 1
         group = period(results[0].period_us) if several else ""
-        for figures in sorted(results, key=lambda figures: figures.timing_model != leading):
+        for figures in sorted(results, key=lambda figures: figures.timing_model != deciding):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
             yield FigureColumn(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
 
@@ -182,7 +180,7 @@ def _verdict(verdict: Verdict) -> Record:
     return {
         "period_us": verdict.period_us,
         **fields(figures, "timing_model", "verdict", "fits"),
-        "missed_limits": [key for key, _ in verdict.missed_limits],
+        "missed_limits": [*dict.fromkeys(missed.key for missed in verdict.missed_limits)],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, verdict.network),
@@ -193,7 +191,6 @@ def _verdict(verdict: Verdict) -> Record:
         "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],
         "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
         "cheapest_change": change and _change_record(change),
-        "setting_change": verdict.setting and _change_record(verdict.setting),
         "fastest_period_us": verdict.fastest and verdict.fastest.us,
         "faster_with": verdict.best_register
         and {"changes": verdict.best_register.changes, "period_us": verdict.best_register.period_us},

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil, floor, isfinite, log10
+from math import ceil
 from typing import Final
 
 from busplan.buses.cycle import RestsOn
@@ -14,29 +14,30 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import period
 from busplan.profile.edit import short_text
-from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
+from busplan.questions.base.sentences import (
+    change_meanings,
+    checked_against,
+    percent_text,
+    settings_sentence,
+    time_decimals,
+    time_lines,
+    time_text,
+    used_us,
+)
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
+from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
+    GroupCapacity,
     after_reset,
     capacity_figures,
     figures,
     limits_behind,
 )
 from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
+from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits, smallest_period
 from busplan.questions.fit.network import changed
-from busplan.questions.plan.search import (
-    NODES,
-    Changes,
-    SettingForPeriod,
-    SmallestPeriod,
-    best_register,
-    cure,
-    cure_by_setting,
-    missed_limits,
-    smallest_period,
-)
 from busplan.sections.base import MAX_COUNT
 
 
@@ -66,7 +67,7 @@ class Verdict:
     """Figures of the other models that were asked for."""
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
-    missed_limits: tuple[tuple[str, str], ...]
+    missed_limits: tuple[MissedLimit, ...]
     """Keys of [limits] that the network does not keep, each with the reason."""
     fastest: SmallestPeriod | None
     """The shortest period with the verdict "fits"; None for a network without a cycle."""
@@ -87,8 +88,6 @@ class Verdict:
     or if no change is enough."""
     no_change: str
     """Why there is no change, if one was looked for."""
-    setting: Change | None = None
-    """A setting of the bus that mends what is wrong, too, where `change` is a longer period."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -122,8 +121,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         network, model=model
     )
     cycle, period_us = bus.cycle(network, model=model), deciding.period_us
-    ratio = float(plain(network.slice_ratio))
-    missed = {need.key: need.words(ratio=ratio, most_us=period_us) for need in missed_limits(network)}
+    missed = missed_limits(network)
     change, no_change = _change(network, deciding, is_missed=bool(missed))
     fastest = smallest_period(network, is_safe=False, with_limits=False) if network.groups else None
     return Verdict(
@@ -132,7 +130,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
         broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
-        missed_limits=tuple(missed.items()),
+        missed_limits=missed,
         fastest=fastest,
         best_register=None if fastest is None else best_register(network, fastest),
         after_reset=after_reset(network, deciding),
@@ -142,7 +140,6 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,
         no_change=no_change,
-        setting=None if change is None else _setting(network, deciding, change),
     )
 
 
@@ -166,21 +163,8 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
     return Change(mending.changes, int(plain(target.nodes)), after), ""
 
 
-def _setting(network: Network, now: CapacityFigures, change: Change) -> Change | None:
-    """A setting of the bus that mends a network, where the change is a longer period."""
-    target = changed(network, {NODES: change.nodes}) if change.nodes != int(plain(network.nodes)) else network
-    values = cure_by_setting(target, instead_of=change.changes)
-    if values is None:
-        return None
-    return Change(values, change.nodes, figures(changed(target, values), model=now.timing_model))
-
-
 _CARD_WORDS: Final = 62
 """Most characters of what the verdict rests on in a line of the card."""
-_DIGITS: Final = 3
-"""Significant digits of a time whose uncertainty is unknown."""
-_MOST_DECIMALS: Final = 6
-"""Most decimals of a time in us: below a picosecond there is only float rounding."""
 _Line = tuple[str, Sentence]
 
 
@@ -223,9 +207,9 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     figures, network = verdict.deciding, verdict.network
     state: State = "passes" if figures.verdict == FITS else "fails"
     if network.groups:
-        available_us, whole_us = figures.available_us, max(figures.period_us, _used_us(figures))
+        available_us, whole_us = figures.available_us, max(figures.period_us, used_us(figures))
         return Gauge(
-            used=_used_us(figures) / whole_us,
+            used=used_us(figures) / whole_us,
             doubt=(figures.uncertainty_us or 0.0) / whole_us,
             free_until=available_us * (1 - network.profile.limits.reserve) / whole_us,
             most=available_us / whole_us,
@@ -239,11 +223,6 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 
 
-def _used_us(figures: CapacityFigures) -> float:
-    """Time the cycle takes, with the bias of the model [us]."""
-    return figures.available_us - (figures.margin_corrected_us or 0.0)
-
-
 def _reasons(verdict: Verdict) -> Iterator[_Line]:
     """Reasons other than time why the machine does not run as the profile has it."""
     for words in verdict.broken_limits:
@@ -251,21 +230,13 @@ def _reasons(verdict: Verdict) -> Iterator[_Line]:
     if not verdict.deciding.safe:
         yield "unsafe", Sentence((verdict.network.bus.safety.setting,), "fails")
     if verdict.deciding.verdict == FITS:
-        yield from (("[limits]", Sentence((words,), "fails")) for _, words in verdict.missed_limits)
+        # Of several groups with too little room, the first.
+        first = {missed.key: missed.words for missed in reversed(verdict.missed_limits)}
+        yield from (("[limits]", Sentence((words,), "fails")) for words in reversed(first.values()))
 
 
 def _times(verdict: Verdict) -> Iterator[_Line]:
-    figures, network, given_us = verdict.deciding, verdict.network, verdict.deciding.available_us
-    uncertainty_us, margin_us = figures.uncertainty_us, figures.margin_corrected_us or 0.0
-    used_us, whole = _used_us(figures), _us(given_us, None)
-    whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
-    bias = f", {_us(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
-    yield "used", Sentence((f"{_us(used_us, uncertainty_us)} us of {whole}, {_percent(used_us / given_us)}{bias}",))
-    doubt = "" if uncertainty_us is None else f", +/- {_us(uncertainty_us, uncertainty_us)}"
-    reserve_us = given_us * network.profile.limits.reserve
-    reserve = f"; {_us(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
-    margin = f"{_us(abs(margin_us), uncertainty_us)} us{doubt}"
-    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{margin}{reserve}",))
+    yield from time_lines(verdict.deciding, verdict.network)
     yield "fastest period", _fastest(verdict)
 
 
@@ -277,7 +248,8 @@ def _fastest(verdict: Verdict) -> Sentence:
         with_best = f"; {_rounded_up(verdict, best.period_us)} with {values}"
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
-        return Sentence((f"none as set{with_best}" if best else f"none: {why}",), "fails")
+        none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
+        return Sentence((f"none as set{with_best}" if best else none,), "fails")
     limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
     as_set = " as set" if best else ""
     return Sentence((f"{_rounded_up(verdict, fastest.us)}{as_set}{limited}{with_best}",))
@@ -286,7 +258,7 @@ def _fastest(verdict: Verdict) -> Sentence:
 def _rounded_up(verdict: Verdict, us: float) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not verdict.network.bus.periods.us:
-        scale = 10.0 ** _decimals(us, verdict.deciding.uncertainty_us)
+        scale = 10.0 ** time_decimals(us, verdict.deciding.uncertainty_us)
         us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
     return period(us)
 
@@ -295,28 +267,43 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
     """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     if verdict.all_well and verdict.has_room:
-        spare = {count.name: (count.safe_nodes or 0) - count.nodes for count in figures.counts}
-        rooms = (
-            f"{number} more {f'of {name}' if name else nouns(number, 'node')}"
-            for name, number in spare.items()
-            if number > 0
-        )
-        yield "room for", Sentence((listed([*rooms], "or"),))
+        spare = [(count, (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
+        rooms = [_more(count, number) for count, number in spare if number > 0]
+        yield "room for", Sentence((listed(rooms, "or"),))
         return
     if verdict.all_well and verdict.network.groups:
         yield "room for", Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
         if verdict.no_change:
-            yield label, Sentence((f"none: {verdict.no_change}",))
+            rest = _beside_limit(verdict, verdict.no_change)
+            why = verdict.no_change if rest is None else rest
+            yield label, Sentence((f"none: {why}" if why else "none",))
         return
-    # The cheaper for the machine first.
-    for name, one in zip((label, "or"), filter(None, (verdict.setting, change)), strict=False):
-        meanings = change_meanings(verdict.network.bus)
-        settings = settings_sentence(one.changes, meanings=meanings, quotes=False)
-        left_us = one.figures.margin_corrected_us
-        left = "" if left_us is None else f", which leaves {_us(left_us, one.figures.uncertainty_us)} us"
-        yield name, joined(settings, Sentence((left,)), by="")
+    meanings = change_meanings(verdict.network.bus)
+    settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
+    left_us = change.figures.margin_corrected_us
+    left = "" if left_us is None else f", which leaves {time_text(left_us, change.figures.uncertainty_us)} us"
+    yield label, joined(settings, Sentence((left,)), by="")
+
+
+def _more(count: GroupCapacity, number: int) -> str:
+    """How many more nodes of a group, or of all, are shown to fit, and their axes."""
+    if count.name:
+        axes = (count.safe_axes or 0) - count.axes
+        return f"{number} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
+    in_all = [
+        plural(number, noun) for number, noun in ((count.safe_nodes, "node"), (count.safe_axes, "axis")) if number
+    ]
+    return f"{number} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
+
+
+def _beside_limit(verdict: Verdict, why: str) -> str | None:
+    """What a reason says beside the words of a limit that stand on the card already; None where it has other words."""
+    for words in verdict.broken_limits:
+        if why.startswith(words):
+            return why.removeprefix(words).strip(" ()")
+    return None
 
 
 def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
@@ -335,7 +322,12 @@ def _buses(figures: CapacityFigures) -> Iterator[_Line]:
     """How many such buses would carry all nodes, where one is not shown to."""
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
-        yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
+        yield "buses", Sentence((f"{ceil(figures.nodes / most)} as set, of {plural(most, 'node')} or fewer",))
+    elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
+        yield (
+            "buses",
+            Sentence((f"no number: a single node is not shown to fit, limited by {figures.safe_limited_by}",)),
+        )
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:
@@ -343,11 +335,11 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
     figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
     if figures.terms:
         largest = max(figures.terms, key=lambda term: plain(term.us))
-        us = _us(plain(largest.us), figures.uncertainty_us)
+        us = time_text(plain(largest.us), figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, {_percent(parts[0]['share'])} of the variance",))
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, {percent_text(parts[0]['share'])} of the variance",))
     if network.groups and figures.bias_us is None:
         (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
         uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
@@ -368,8 +360,10 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
     deciding = verdict.deciding
     for other in verdict.others:
         if contradicts(other.fits, deciding):
-            needed_us = _us(other.required_us, deciding.uncertainty_us)
-            words = f"says otherwise, {needed_us} us needed of {_us(other.available_us, None)}, but does not decide"
+            needed_us = time_text(other.required_us, deciding.uncertainty_us)
+            words = (
+                f"says otherwise, {needed_us} us needed of {time_text(other.available_us, None)}, but does not decide"
+            )
             yield f"{other.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in verdict.network.bus.safety.after_reset.items())
@@ -389,21 +383,3 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
         }
         for doubt in sorted(figures.doubts, key=lambda doubt: -float(doubt.us))
     ]
-
-
-def _percent(share: float) -> str:
-    return f"{share:.0%}".replace("%", " %")
-
-
-def _us(us: float, uncertainty_us: float | None) -> str:
-    """A time with as many digits as its uncertainty allows."""
-    return f"{us:.{_decimals(us, uncertainty_us)}f}"
-
-
-def _decimals(us: float, uncertainty_us: float | None) -> int:
-    """Decimals down to the first digit of the uncertainty; without one, for `_DIGITS` significant digits."""
-    if uncertainty_us and isfinite(uncertainty_us):
-        decimals = -floor(log10(uncertainty_us))
-    else:
-        decimals = _DIGITS - 1 - floor(log10(abs(us))) if us else 0
-    return min(max(0, decimals), _MOST_DECIMALS)

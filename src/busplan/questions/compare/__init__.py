@@ -17,16 +17,11 @@ from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, require_cycle, with_its_constants
 from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
 from busplan.questions.fit.inputs import assumed_rates, given
+from busplan.questions.fit.needs import SmallestPeriod, smallest_period
 from busplan.questions.fit.network import OfNetwork, at_period, changed, network_of, varied_nodes
-from busplan.questions.plan.search import (
-    SettingForPeriod,
-    SmallestPeriod,
-    best_register,
-    settings_to_be_carried,
-    smallest_period,
-)
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
@@ -68,7 +63,8 @@ class MachineOnKind(NamedTuple):
     curve: tuple[SafeAxes, ...]
     """The most axes over the period."""
     best: SettingForPeriod | None = None
-    """The setting, free to change, that makes `smallest` the smallest; the most axes are those with it or without."""
+    """The setting, free to change, that makes `smallest` the smallest; the most axes are those with it or without.
+    None on the profile's own kind."""
 
     @property
     def profile(self) -> Profile:
@@ -199,7 +195,7 @@ def compare(
     >>> import busplan
     >>> answer = busplan.compare("paper-4ms", buses=["ieee1394", "can"])
     >>> [(kind.figures.verdict, kind.safe.axes, round(kind.smallest.us)) for kind in answer.kinds]
-    [('fits', 52, 432), ('fits', 16, 2126)]
+    [('fits', 52, 553), ('fits', 16, 2126)]
     >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
@@ -246,7 +242,8 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
         assumed = (*tried, *(assumption for assumption in assumed if assumption.key not in needed))
         on_kind = changed(on_kind, needed)
     smallest = smallest_period(on_kind, with_limits=False)
-    best = best_register(on_kind, smallest)
+    # The profile's own kind is shown as it is set.
+    best = None if is_own else best_register(on_kind, smallest)
     if best is not None:
         smallest = smallest_period(changed(on_kind, best.changes), with_limits=False)
     rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))

@@ -200,6 +200,9 @@ def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
     broken = [limit.words(machine.network) for limit in limits_behind(figures, machine.network)]
     if broken:
         sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(broken)}.",)))
+    if not machine.safe.nodes:
+        at = period(figures.period_us)
+        sentences.append(Sentence((f"Not one node is shown to fit {at}, limited by {machine.safe.limited_by}.",)))
     if machine.smallest.us is None:
         sentences.append(Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",)))
     sentences += reset_sentence(machine.after_reset, machine.network)

@@ -18,8 +18,8 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_network
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.needs import missed_limits
 from busplan.questions.fit.network import OfNetwork, model_names, network_of
-from busplan.questions.plan.search import missed_limits
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 
@@ -221,7 +221,8 @@ def _models(timing_model: Models, a: Network, b: Network) -> tuple[str, ...]:
 def _side(name: str, network: Network) -> DiffSide:
     with constants_changed(network.profile.constants):
         deciding = capacity_figures(network, model=network.bus.deciding_model)
-        return DiffSide(name, network, deciding, tuple(need.key for need in missed_limits(network)))
+        missed = tuple(dict.fromkeys(missed.key for missed in missed_limits(network)))
+        return DiffSide(name, network, deciding, missed)
 
 
 def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:

@@ -213,7 +213,6 @@ def _side_record(side: DiffSide) -> Record:
     return {
         "argument": side.argument,
         "profile": side.profile.name,
-        "timing_model": side.profile.bus.timing_model,
         "verdict": side.verdict,
         "missed_limits": list(side.missed_limits),
     }

@@ -20,7 +20,7 @@ from busplan.questions.explain.formula import formula_text, inputs, lines
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures
 from busplan.questions.fit.inputs import choosing_keys, traced_network
-from busplan.questions.fit.network import leading_model, model_names
+from busplan.questions.fit.network import model_names
 from busplan.sourced import Input, Sourced, short
 
 CommandName = Literal["capacity", "latency"]
@@ -96,7 +96,7 @@ def derive(
     name
         Name of the figure; see `wanted`.
     timing_models
-        Timing models; by default the one that leads, or the one that decides for figures that it alone has.
+        Timing models; by default the one that decides, or the first that has the figure.
     transactions
         Transactions, for a figure of `latency`; by default all that have it.
 
@@ -121,11 +121,11 @@ def derive(
 
 def _at_period(network: Network, meant: Wanted, timing_models: Sequence[str] | None) -> Iterator[Derivation]:
     """The derivations of some figures, nested by transaction, figure and timing model."""
-    deciding, leading = network.bus.deciding_model, leading_model(network)
-    models = timing_models or (leading, deciding)
+    models = timing_models or model_names(network)
     numbers = {model: numbers_of(network, meant.command, model=model) for model in models}
     for transaction, figure in product(meant.transactions or numbers[models[0]], meant.figures):
-        for model in timing_models or [deciding if figure in CERTAINTY else leading]:
+        having = [model for model in models if figure.key in numbers[model].get(transaction, {})]
+        for model in timing_models or having[:1]:
             traced = numbers[model][transaction]
             for shown in (figure, *_BESIDE.get(figure.key, ())):
                 if shown.key in traced:
@@ -236,10 +236,9 @@ def _named(number: Number, key: str, symbol: str) -> Traced:
 
 def explained_figures(network: Network) -> list[tuple[CommandName, Figure]]:
     """Every figure of a network that an equation leads to, with its command, in the order of their documents."""
-    models = {leading_model(network), network.bus.deciding_model}
     explained: list[tuple[CommandName, Figure]] = []
     for command, figures in figures_of(network.bus).items():
-        traced = [keys for model in models for keys in numbers_of(network, command, model=model).values()]
+        traced = [keys for model in model_names(network) for keys in numbers_of(network, command, model=model).values()]
         explained += [(command, figure) for key, figure in figures.items() if any(key in keys for keys in traced)]
     return explained
 

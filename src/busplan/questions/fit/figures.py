@@ -227,6 +227,17 @@ class CapacityFigures(FitFigures):
     safe_axes: int | None = None
     safe_limited_by: str | None = None
 
+    @property
+    def most_axes(self) -> int | None:
+        """The most axes of the network that are shown to fit, with more nodes of the group with the most axes.
+
+        None without axes, and under a model that does not decide.
+        """
+        most = max(self.counts, key=lambda count: count.axes, default=None)
+        if most is None or not most.axes or most.safe_axes is None:
+            return None
+        return most.safe_axes and most.safe_axes + sum(count.axes for count in self.counts if count is not most)
+
     def by_key(self) -> dict[str, Any]:
         """The figures of the JSON document by key, in its order."""
         values = self.values()

@@ -172,9 +172,3 @@ def model_names(network: Network) -> tuple[str, ...]:
     """Names of the timing models that can express a network, in the order reports show them."""
     bus = network.bus
     return tuple(model.name for model in bus.timing_models if not bus.cannot_express(network, model=model.name))
-
-
-def leading_model(network: Network) -> str:
-    """Timing model shown first, by name: the profile's own, or the deciding one if that cannot express the network."""
-    model: str = network.profile.bus.timing_model
-    return model if model in model_names(network) else network.bus.deciding_model

@@ -24,21 +24,20 @@ from busplan.questions.base.inputs import (
     whole,
     with_its_constants,
 )
-from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
-from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
-from busplan.questions.plan.search import (
+from busplan.questions.fit.cure import (
     Changes,
     Freedom,
-    Need,
     PlanStep,
     freed,
     freedoms,
-    most_asking,
     nodes_for_axes,
     search,
     settings_to_be_carried,
     stands_in_the_way,
 )
+from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
+from busplan.questions.fit.needs import Need, most_asking
+from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 
@@ -170,8 +169,8 @@ def plan(
         Other values to keep by dotted key, in the key's unit: {"payload.read_bytes": 16}. `KeyChanges` have options
         besides, which errors name.
     free
-        Names of what may be changed, as gap_count, slice_ratio, responses, payload, period and nodes; by default the
-        registers of the bus, the slice ratio to 0.9, and the period.
+        Names of what may be changed, as gap_count, slice_ratio, responses, payload, period and nodes, or their keys; by
+        default all but payload and nodes.
 
     Returns
     -------

@@ -36,10 +36,10 @@ from busplan.questions.base.sentences import (
     with_profile,
 )
 from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.cure import freedoms
 from busplan.questions.fit.figures import COUNTS, limits_behind
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
-from busplan.questions.plan.search import freedoms
 from busplan.sections.base import TRANSACTION_KINDS
 
 

@@ -21,6 +21,7 @@ from busplan.forms.blocks import (
     Report,
     SectionLink,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
@@ -128,12 +129,13 @@ def _comparison(profiles: "Sequence[ReportedProfile]") -> Table:
         TableColumn("+/-", "us"),
         TableColumn("safe axes"),
     )
-    figures = (VERDICT, PERIOD, NODES, AXES, UTILISATION, MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES)
+    figures = (VERDICT, PERIOD, NODES, AXES, UTILISATION, MARGIN_CORRECTED, UNCERTAINTY)
     rows = tuple(
         TableRow(
             (
                 SectionLink(reported.network.profile.name, f"p{number}", shell_word(reported.argument)),
                 *(attribute_value(figure, reported.verdict.deciding) for figure in figures),
+                ShownValue(reported.verdict.deciding.most_axes, SAFE_AXES.key),
             )
         )
         for number, reported in enumerate(profiles, start=1)

@@ -4,7 +4,7 @@
 time.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from math import fsum
 from typing import Final, NamedTuple
@@ -13,11 +13,10 @@ from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.limits import IDLE
 from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
-from busplan.elementwise import plain
+from busplan.elementwise import Number, existing, plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import fits_in
-from busplan.questions.fit.figures import FitFigures, figures, margin_us
-from busplan.questions.fit.network import leading_model
+from busplan.questions.fit.certainty import certainty, fits_in
+from busplan.questions.fit.figures import FitFigures, certainty_numbers, figures, margin_us
 from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
@@ -69,6 +68,10 @@ class Schedule(NamedTuple):
     """End of the window [us]."""
     required_us: float
     """Closed form of the time that the cycle needs [us]."""
+    margin_corrected_us: float | None
+    """Time that the cycle leaves of its slice, less the bias; None under a model that does not decide [us]."""
+    uncertainty_us: float | None
+    """Expanded uncertainty of that; None where it is unknown, too [us]."""
     number: int | None
     """Number of the cycle that was asked for, from 1; None for that of the verdict."""
     cycles: int
@@ -131,7 +134,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     network
         The network.
     model
-        Timing model; without it the one whose figures lead.
+        Timing model; without it the one that decides.
     number
         Number of the cycle, from 1; by default the cycle that the verdict is for.
 
@@ -160,7 +163,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
-    model = leading_model(network) if model is None else model
+    model = network.bus.deciding_model if model is None else model
     closed, cycle = figures(network, model=model), cycle_of(network, model, number)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
@@ -176,9 +179,19 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         from_us=0.0,
         to_us=events[-1].end_us,
         required_us=plain(cycle.required_us),
+        **certainty_of(cycle, model),
         number=number,
         cycles=hyperperiod(cycle.rates),
     )
+
+
+def certainty_of(cycle: BusCycle, model: str) -> dict[str, float | None]:
+    """The corrected margin of a cycle and its uncertainty [us]; None under a model that does not decide."""
+    numbers: Mapping[str, Number | None] = {}
+    if model == cycle.network.bus.deciding_model:
+        numbers = certainty_numbers(certainty(cycle), cycle)
+    found = {key: numbers.get(key) for key in ("margin_corrected_us", "uncertainty_us")}
+    return {key: None if number is None else existing(number) for key, number in found.items()}
 
 
 def zoom(

@@ -30,9 +30,16 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import figure_text, period_value, sentence_text, with_unit
-from busplan.questions.base.sentences import document, fields, margin_words, safety_record, warning_sentences
+from busplan.questions.base.sentences import (
+    document,
+    fields,
+    margin_words,
+    safety_record,
+    time_lines,
+    warning_sentences,
+)
 from busplan.questions.fit.certainty import FITS, fits_in
-from busplan.questions.fit.figures import margin_us
+from busplan.questions.fit.figures import limits_behind, margin_us
 from busplan.questions.fit.network import model_names
 from busplan.questions.timeline.events import (
     EVENTS,
@@ -43,6 +50,7 @@ from busplan.questions.timeline.events import (
     Event,
     Schedule,
     Total,
+    certainty_of,
     cycle_of,
     distinct_cycles,
     drawn_number,
@@ -73,7 +81,7 @@ def timeline_report(schedule: Schedule) -> Report:
         (
             summary,
             *warning_sentences(schedule.network),
-            _margins(needs),
+            *([_margins(needs)] if len(needs) > 1 else []),
             *(Sentence((words,)) for words in _cycle_words(schedule, distinct)),
             _chart(schedule, needs, title=sentence_text(summary)),
             _totals_table(schedule),
@@ -89,37 +97,49 @@ class ModelNeeds(NamedTuple):
     timing_model: str
     required_us: float
     margin_us: float
+    """What it leaves of the slice, by the timing model alone."""
+    margin_corrected_us: float | None
+    """The same less the bias, as in the verdict; None under a model that does not decide."""
+
+    @property
+    def free_us(self) -> float:
+        """What it leaves of the slice, as far as its model knows [us]."""
+        return self.margin_us if self.margin_corrected_us is None else self.margin_corrected_us
 
 
 def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
     """Time that the drawn cycle needs under each timing model that applies."""
     needs, available_us = [], schedule.figures.available_us
     for model in model_names(schedule.network):
-        required_us = plain(cycle_of(schedule.network, model, schedule.number).required_us)
-        needs.append(ModelNeeds(model, required_us, plain(margin_us(required_us, available_us=available_us))))
+        cycle = cycle_of(schedule.network, model, schedule.number)
+        required_us, corrected_us = plain(cycle.required_us), certainty_of(cycle, model)["margin_corrected_us"]
+        margin = plain(margin_us(required_us, available_us=available_us))
+        needs.append(ModelNeeds(model, required_us, margin, corrected_us))
     return tuple(needs)
 
 
 def _headline(schedule: Schedule) -> Sentence:
-    """Say what the fullest cycle leaves of its slice under the leading model, and the verdict if that model decides."""
-    figures = schedule.figures
-    parts: tuple[Part, ...] = (
-        *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
-        *margin_words(figures, schedule.network),
-        f" by the {figures.timing_model} model",
-        " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else "",
-    )
+    """Say the verdict as `capacity` does; under a model that does not decide, what it leaves of the slice."""
+    figures, network = schedule.figures, schedule.network
+    name: tuple[Part, ...] = (Code(schedule.profile.name), " at ", period_value(figures.period_us), ": ")
+    which = " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else ""
     if figures.verdict is None:
-        return Sentence((*parts, ", which does not affect the verdict."), state_of(figures.fits and figures.safe))
+        words = (*margin_words(figures, network), f" by the {figures.timing_model} model{which}")
+        return Sentence(
+            (*name, *words, ", which does not affect the verdict."), state_of(figures.fits and figures.safe)
+        )
     state = state_of(figures.verdict == FITS and figures.safe)
     verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
-    return Sentence((*parts, "; verdict: ", verdict, "."), state)
+    reasons = (limit.words(network) for limit in limits_behind(figures, network))
+    lines = (f"{label} {sentence_text(line)}" for label, line in time_lines(figures, network))
+    said = f" by the {figures.timing_model} model{which}; {'; '.join((*reasons, *lines))}."
+    return Sentence((*name, verdict, said), state)
 
 
 def _margins(needs: Sequence[ModelNeeds]) -> Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(f"{{}} by the {model.timing_model} model", figure_value(MARGIN, model.margin_us)) for model in needs
+        sentence(f"{{}} by the {model.timing_model} model", figure_value(MARGIN, model.free_us)) for model in needs
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
@@ -183,18 +203,19 @@ def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
     """The whole period, transaction by transaction, and what each timing model needs and leaves of its slice."""
     figures, end_us = schedule.figures, schedule.end_us
     slice_us, period_us = figures.available_us, figures.period_us
-    scale_us = max(period_us, end_us, *(model.required_us for model in needs))
+    scale_us = max(period_us, end_us, *(slice_us - model.free_us for model in needs))
     lanes = [Lane("cycle", (*_transactions(schedule, schedule.cycle_events), *_part(_REST, end_us, period_us)))]
     for model in needs:
+        used_us = slice_us - model.free_us
         parts = (
-            *_part(_NEEDED, 0.0, min(model.required_us, slice_us)),
-            *_part(_LEFT, model.required_us, slice_us),
-            *_part(_BEYOND, slice_us, model.required_us),
-            *_part(_REST, max(model.required_us, slice_us), period_us),
+            *_part(_NEEDED, 0.0, min(used_us, slice_us)),
+            *_part(_LEFT, used_us, slice_us),
+            *_part(_BEYOND, slice_us, used_us),
+            *_part(_REST, max(used_us, slice_us), period_us),
         )
-        left = with_unit(figure_value(MARGIN, abs(model.margin_us)))
-        words = f"{left} short" if model.margin_us < 0 else f"margin {left}"
-        needed = with_unit(figure_value(REQUIRED, model.required_us))
+        left = with_unit(figure_value(MARGIN, abs(model.free_us)))
+        words = f"{left} short" if model.free_us < 0 else f"margin {left}"
+        needed = with_unit(figure_value(REQUIRED, used_us))
         lanes.append(Lane(model.timing_model, parts, f"{needed} needed, {words}", is_thin=True))
     slice_words, title = _time(slice_us), f"The period of {_time(period_us)} us"
     if _overruns(schedule):
@@ -358,7 +379,7 @@ def _document(
         distinct_cycles=None if distinct is None else [cycle._asdict() for cycle in distinct],
         required_us=schedule.required_us,
         available_us=figures.available_us,
-        margin_us=schedule.margin_us,
+        **fields(schedule, "margin_us", "margin_corrected_us", "uncertainty_us"),
         **fields(figures, "exceeded", "not_shown", "fits", "verdict"),
         **safety_record(figures, network),
         warnings=network.bus.warnings(network, nodes=[figures.nodes]),

@@ -1,7 +1,7 @@
-"""What a network needs, and the changes that a plan tries for it."""
+"""What may be changed in a network, and the changes with which it holds every constraint of a plan."""
 
 from bisect import bisect_left
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import ROUND_CEILING, Context, Decimal
 from itertools import product
 from math import ceil, inf
@@ -9,206 +9,41 @@ from typing import Final, NamedTuple, TypeAlias
 
 from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
-from busplan.elementwise import FIT_ROUNDING, plain, within
+from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import TIME, certainty
+from busplan.questions.fit.needs import (
+    Need,
+    SmallestPeriod,
+    most_asking,
+    rooms,
+    smallest_period,
+    to_be_shown,
+    unmet,
+)
 from busplan.questions.fit.network import PERIOD, at_period, changed
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
-_MOST_SLICE_US: Final = 1e12
-"""Longer than any slice of a profile: it keeps quotients finite."""
-
-
-class Need(NamedTuple):
-    """Time that one constraint asks of the slice, or of the period itself."""
-
-    slice_us: float
-    """Length that the slice must have; infinite where none is enough [us]."""
-    key: str
-    """Source of the need: time, the key of a limit of the bus, or a key of the profile."""
-    why: str = ""
-    """Reason that no slice and no period helps, in words."""
-    least_us: float = 0.0
-    """The shortest period, whatever the slice ratio; 0 where any will do [us]."""
-
-    def period_us(self, ratio: float) -> float:
-        """The shortest period that gives what is asked, with a slice ratio [us]."""
-        return max(self.slice_us / ratio, self.least_us)
-
-    def words(self, *, ratio: float, most_us: float) -> str:
-        """Say what is asked, and the longest period there is.
-
-        Parameters
-        ----------
-        ratio
-            Slice ratio [1].
-        most_us
-            The longest period [us].
-        """
-        if self.why:
-            return self.why
-        if self.least_us > self.slice_us / ratio:
-            return f"{self.key} needs a period of {self.least_us:.3f} us, and {most_us:.3f} us is the longest"
-        needs = f"needs a slice of {self.slice_us:.3f} us"
-        who = f"the cycle {needs} to be shown to fit" if self.key == TIME else f"{self.key} {needs}"
-        return f"{who}, and at most {ratio * most_us:.3f} us can be given"
-
-
-class Room(NamedTuple):
-    """A network with as many nodes as a key of [limits] asks the bus to carry."""
-
-    key: str
-    network: Network
-    words: str
-    """How many nodes these are."""
-
-
-def rooms(network: Network) -> Iterator[Room]:
-    """The network with the nodes that [limits] asks the bus to carry: more of each group, the others as they are."""
-    limits = network.profile.limits
-    for group in network.profile.node_groups:
-        more = {"limits.min_spare_nodes": limits.min_spare_nodes}
-        if limits.min_spare_axes is not None and group.node.axes:
-            more["limits.min_spare_axes"] = ceil(limits.min_spare_axes / int(group.node.axes))
-        for key, spare in more.items():
-            if spare is not None:
-                nodes = int(group.nodes) + spare
-                of = f" of {group.name}" if group.name else ""
-                yield Room(key, network.varying(group.name).with_nodes(nodes), f"{nodes} nodes{of}")
-
-
-def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
-    """Needs of a network to be shown to fit, with bias, uncertainty and reserve.
-
-    Time first, and then each limit that asks for a longer period than all before it.
-
-    Parameters
-    ----------
-    network
-        The network; its own period plays no part.
-    is_safe
-        Whether the bus must be set safely, too.
-    """
-    bus = network.bus
-    time = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
-    yield time
-    least_us = 0.0
-    for limit in bus.limits:
-        if limit.role == "period" or (limit.role == "safety" and not is_safe):
-            continue
-        # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
-        at_us = max(time.slice_us, least_us, MIN_STEP_US)
-        at = network if limit.period is None else network._replace(period_us=at_us)
-        if limit.shown.is_broken(at):
-            kept_us = plain(limit.shown.shortest_period_us(at))
-            if kept_us == inf:
-                way_out = f" ({limit.advice(at)})" if limit.way_out else ""
-                yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
-                return
-            least_us = max(least_us, kept_us)
-            yield Need(0.0, limit.key, least_us=kept_us)
-
-
-def most_asking(needs: Iterable[Need], *, ratio: float) -> Need:
-    """The need that asks for the longest period with a slice ratio, the first of equals."""
-    return max(needs, key=lambda need: need.period_us(ratio))
-
-
-def _of_limits(network: Network) -> Iterator[Need]:
-    """Needs of [limits]: the share of the slice that may be used, and more nodes that must be shown to fit, too."""
-    most, key = network.profile.limits.max_utilisation, "limits.max_utilisation"
-    if most is not None:
-        bus = network.bus
-        required_us = float(bus.cycle(network, model=bus.deciding_model).required_us)
-        us = required_us / most if most * _MOST_SLICE_US > required_us else inf
-        yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
-    for room in rooms(network):
-        for need in to_be_shown(room.network):
-            why = need.why and f"{room.key} asks for room for {room.words}: {need.why}"
-            yield need._replace(key=room.key, why=why)
-
-
-def missed_limits(network: Network) -> tuple[Need, ...]:
-    """Needs of [limits] that the slice of a network does not meet; the verdict is not among them."""
-    if not network.groups:
-        return ()
-    return tuple({need.key: need for need in _unmet(_of_limits(network), network)}.values())
-
-
-def unmet(network: Network) -> list[Need]:
-    """Needs that a network does not meet at its own period; empty where every constraint of a plan holds."""
-    limits = network.bus.limits
-    broken = [limit for limit in limits if limit.role == "period" and limit.is_broken(network)]
-    needs = list(_unmet([*to_be_shown(network), *_of_limits(network)], network))
-    if not broken and not needs:
-        # What a limit needs of the slice was computed at the shortest period.
-        broken = [limit for limit in limits if limit.period is not None and limit.shown.is_broken(network)]
-    return [*(Need(inf, limit.key, limit.words(network)) for limit in broken), *needs]
-
-
-def _unmet(needs: Iterable[Need], network: Network) -> Iterator[Need]:
-    ratio, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
-    return (need for need in needs if not within(need.period_us(ratio), period_us))
-
-
-class SmallestPeriod(NamedTuple):
-    """The smallest period at which a network holds every constraint, of those that its bus allows."""
-
-    us: float | None
-    """None if there is none [us]."""
-    need: Need
-    """What asks for it, or why there is none."""
-
-
-_MOST_TRIES: Final = 64
-"""Each try keeps one more limit, so that a few are enough."""
-_NEXT: Final = 1 + 1e-9
-"""A limit that rounding alone breaks is kept a little later."""
-
-
-def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool = True) -> SmallestPeriod:
-    """Find the smallest period at which a network is shown to fit.
-
-    Parameters
-    ----------
-    network
-        The network; its own period plays no part.
-    is_safe
-        Whether the bus must be set safely, too.
-    with_limits
-        Whether [limits] must hold, too.
-    """
-    bus, ratio = network.bus, float(plain(network.slice_ratio))
-
-    def most(at: Network) -> Need:
-        more = _of_limits(at) if with_limits else ()
-        return most_asking((*to_be_shown(at, is_safe=is_safe), *more), ratio=ratio)
-
-    def missing(period_us: float) -> Need | None:
-        at = at_period(network, period_us)
-        need = most(at)
-        broken = any(limit.period is not None and limit.shown.is_broken(at) for limit in bus.limits)
-        return need if broken or not within(need.period_us(ratio), period_us) else None
-
-    need, longest_us = most(network), min(bus.periods.longest_us, MAX_TIME_US)
-    found_us = _allowed_us(network, need.period_us(ratio))
-    for _ in range(_MOST_TRIES):
-        if found_us > longest_us:
-            break
-        lacking = missing(found_us)
-        if lacking is None:
-            return SmallestPeriod(found_us, need)
-        need, found_us = lacking, _allowed_us(network, max(lacking.period_us(ratio), found_us * _NEXT))
-    why = need.words(ratio=ratio, most_us=longest_us)
-    return SmallestPeriod(None, need._replace(why=why))
+Changes: TypeAlias = Mapping[str, Value]
+"""New values of a profile by dotted key."""
+NODES: Final = "bus.nodes"
+"""Key of the number of nodes, where all are alike."""
+RATIO: Final = "cycle.slice_ratio"
+MOST_RATIO: Final = 0.9
+"""Largest slice ratio that is advised: the host computes in the rest of the period. Chosen."""
+_RATIO_STEPS: Final = 100
+_PERIOD_DIGITS: Final = 3
+"""Significant digits of a period that is advised."""
+_ASKED_FOR: Final = (Cost.PAYLOAD, Cost.NODES)
+"""Costs of what changes what the machine does, and so is free only where a plan is asked to."""
+_PAYLOADS: Final = tuple(f"{kind}_bytes{part}" for kind in TRANSACTION_KINDS for part in ("", "_per_axis"))
 
 
 class SettingForPeriod(NamedTuple):
     """A setting that only a number in the nodes has to change for, and the smallest period with it."""
 
-    changes: "Changes"
+    changes: Changes
     """New value by dotted key."""
     period_us: float
 
@@ -238,25 +73,6 @@ def best_register(network: Network, now: SmallestPeriod) -> SettingForPeriod | N
     return best if best and best.period_us < _WORTHWHILE * (now.us or inf) else None
 
 
-def _allowed_us(network: Network, least_us: float) -> float:
-    """The shortest period of at least a time that a bus allows; infinite where there is none [us]."""
-    return float(plain(network.bus.periods.shortest_us(max(MIN_STEP_US, least_us))))
-
-
-Changes: TypeAlias = Mapping[str, Value]
-"""New values of a profile by dotted key."""
-NODES: Final = "bus.nodes"
-"""Key of the number of nodes, where all are alike."""
-RATIO: Final = "cycle.slice_ratio"
-MOST_RATIO: Final = 0.9
-"""Largest slice ratio that is advised: the host computes in the rest of the period. Chosen."""
-_RATIO_STEPS: Final = 100
-_PERIOD_DIGITS: Final = 3
-"""Significant digits of a period that is advised."""
-_DEFAULT_COSTS: Final = (Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
-_PAYLOADS: Final = tuple(f"{kind}_bytes{part}" for kind in TRANSACTION_KINDS for part in ("", "_per_axis"))
-
-
 class Freedom(NamedTuple):
     """One thing that a plan may change."""
 
@@ -264,6 +80,10 @@ class Freedom(NamedTuple):
     label: str
     cost: Cost
     keys: tuple[str, ...]
+
+    def is_meant(self, name: str) -> bool:
+        """Whether a name is its own, or one of its keys as a profile writes them."""
+        return name == self.name or name in self.keys
 
 
 class PlanStep(NamedTuple):
@@ -304,8 +124,7 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     network
         The network.
     names
-        Names of freedoms; None for the bus's registers, the slice ratio and the period, or for all of them in a network
-        without a cycle.
+        Names of freedoms, or keys that one of them changes; None for all but payload and nodes.
     kept
         Keys that were given a value, which stays.
 
@@ -317,23 +136,23 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     possible = freedoms(network)
     still = [freedom for freedom in possible if not set(freedom.keys) <= set(kept)]
     if names is None:
-        return tuple(freedom for freedom in still if freedom.cost in _DEFAULT_COSTS or not network.groups)
+        return tuple(freedom for freedom in still if freedom.cost not in _ASKED_FOR)
     kind = f"{network.profile.bus.kind} with groups" if network.profile.group else network.profile.bus.kind
     problems = [
         f"free {name}: there is nothing of that name to free on a bus of kind {kind}; there are "
-        f"{', '.join(freedom.name for freedom in possible)}"
+        f"{', '.join(freedom.name for freedom in possible)}, or their keys"
         for name in names
-        if name not in {freedom.name for freedom in possible}
+        if not any(freedom.is_meant(name) for freedom in possible)
     ]
     problems += [
         f"free {freedom.name}: {' and '.join(key for key in freedom.keys if key in kept)} was given a value, which is "
         "kept; give one of them"
         for freedom in possible
-        if freedom.name in names and freedom not in still
+        if any(map(freedom.is_meant, names)) and freedom not in still
     ]
     if problems:
         raise BusplanError(*problems)
-    return tuple(freedom for freedom in still if freedom.name in names)
+    return tuple(freedom for freedom in still if any(map(freedom.is_meant, names)))
 
 
 def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[PlanStep]:
@@ -465,12 +284,15 @@ def _holds(network: Network, change: Changes | None) -> bool:
 
 
 def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
-    """The change to payloads of so many bytes or less; empty where they are, None where no payload would be left."""
+    """The change to payloads of so many bytes or less; empty where they are, None where that cannot be."""
     changes: dict[str, Value] = {}
     for group, kind in product(profile.node_groups, TRANSACTION_KINDS):
         over, (key, bytes_cut) = int(group.bytes_of(kind)) - most_bytes, _cut(group, kind)
         if over > 0 and key not in kept:
-            changes[key] = getattr(group.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+            now = getattr(group.payload, key.rpartition(".")[2])
+            if now is None:  # it is given by the bytes of each PDO
+                return None
+            changes[key] = now - ceil(over / bytes_cut)
     return changes if all(int(value) > 0 for value in changes.values()) else None
 
 
@@ -529,23 +351,6 @@ def cure(network: Network) -> Cure:
     return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
 
 
-def cure_by_setting(network: Network, *, instead_of: Changes) -> Changes | None:
-    """The cheapest setting of the bus that alone mends a network, where its cure is a longer period; None if none does.
-
-    Parameters
-    ----------
-    network
-        The network.
-    instead_of
-        Its cure.
-    """
-    if PERIOD not in instead_of:
-        return None
-    settings = sorted(network.bus.settings(network), key=lambda setting: setting.cost)
-    trials = (values for setting in settings if setting.cost < Cost.PERIOD for values in setting.values)
-    return next((values for values in trials if _holds(network, values)), None)
-
-
 def stands_in_the_way(network: Network, step: PlanStep) -> Need:
     """The constraint that a step does not hold, with its words."""
     after = changed(network, step.changes)
@@ -555,7 +360,7 @@ def stands_in_the_way(network: Network, step: PlanStep) -> Need:
 
 
 def changeable(network: Network) -> tuple[str, ...]:
-    """Default freedoms of a plan, in words, the cheapest first."""
+    """What a plan may change unasked, in words, the cheapest first."""
     return tuple(freedom.label for freedom in freed(network))
 
 
