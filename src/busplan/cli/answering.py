@@ -114,8 +114,8 @@ def write_report(report: "Report", form: Form, file: NewFile | None) -> None:
     if form == "table" and file is None:
         from busplan.forms import terminal
 
-        width, height = terminal_size() or (None, None)
-        emit_pages(terminal.text(report, width=width, height=height, styled=is_styled()))
+        width, _ = terminal_size() or (None, None)
+        emit_pages(terminal.text(report, width=width, styled=is_styled()))
     else:
         write_document(render(report, form), file)
 

@@ -416,7 +416,7 @@ class CanCycle(BusCycle):
             return doubts
         late_us = (self._of(self.traffic.longest).required_us - self.required_us) / 2
         key = "bus.clock_tolerance" if bus.clock_tolerance else "fd_late_bits"
-        return *doubts, Doubt(key, "longer bits and FD frames", late_us)
+        return *doubts, Doubt(key, "clocks that are not exact, and long FD frames", late_us)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The host's own time, the slowest execution, and what else is on the bus."""
@@ -505,8 +505,8 @@ class CanCycle(BusCycle):
             lines.append(("latest message", f"{latest.name}, {words}"))
         possible_us = plain(self.possible_us())
         if possible_us:
-            why = "its frames may hide this" if self.traffic.access == "burst" else "the test of queues is sufficient"
-            lines.append(("upper bound", f"up to {_short(possible_us)} us less may do: {why}"))
+            why = "frames of a burst wait" if self.traffic.access == "burst" else "messages in queues wait"
+            lines.append(("upper bound", f"{why} up to {_short(possible_us)} us; they may wait less"))
         most = bisect_left(range(int(MOST_REPEATED) + 1), 1, key=lambda number: len(self._late_with(number))) - 1
         if most >= 0:
             kept = f"up to {most} in a row keep every deadline, one more" if most else "a single one"

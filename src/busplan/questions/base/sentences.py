@@ -104,6 +104,12 @@ def checked_against(data: Sequence[str], *, has_cycle: bool = True) -> str:
     return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
+def never_measured(data: Sequence[str]) -> str:
+    """Parts of a bus model that no figure of the data files tests; without any figure, the whole cycle."""
+    tested = parts_tested(data)
+    return ", ".join(tested.untested) or ("" if tested.parts else "a whole cycle; no figure is published")
+
+
 def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
     """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
     if after is not None:

@@ -10,6 +10,7 @@ from busplan.english import nouns
 from busplan.forms.blocks import (
     Block,
     Code,
+    Detail,
     Record,
     Report,
     Sentence,
@@ -45,7 +46,6 @@ def capacity_report(answer: CapacityAnswer) -> Report:
         tuple(_blocks(answer)),
         document("capacity", profile=name, results=results, verdicts=list(map(_verdict, answer.verdicts))),
         with_profile(name, records),
-        is_card_enough=True,
     )
 
 
@@ -53,9 +53,7 @@ def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(answer.verdicts, start=1):
         yield card(verdict, is_brief=number < len(answer.verdicts))
-    yield _table(answer)
-    if answer.profile.group:
-        yield _groups_table(answer)
+    yield Detail((_table(answer), *([_groups_table(answer)] if answer.profile.group else [])))
 
 
 _GROUP_BY_DECIDING: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
@@ -167,7 +165,7 @@ def _change_record(change: Change) -> Record:
 def _verdict(verdict: Verdict) -> Record:
     change, figures, bus = verdict.change, verdict.deciding, verdict.network.bus
     missing = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
-    summary = card(verdict)
+    summary = card(verdict).whole
     lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
     return {

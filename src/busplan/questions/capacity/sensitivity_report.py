@@ -59,7 +59,6 @@ def sensitivity_report(answer: CapacityAnswer) -> Report:
         blocks=(*report.blocks, *chain.from_iterable(map(_blocks, sensitivities))),
         document={**report.document, "verdicts": verdicts},
         records=with_profile(answer.profile.name, rows),
-        is_card_enough=False,
     )
 
 

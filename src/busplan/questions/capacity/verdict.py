@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import ceil, floor, isfinite, log10
-from typing import Final
+from math import ceil, sqrt
 
 from busplan.buses.cycle import LeftOut
 from busplan.buses.network import Network
@@ -12,9 +11,10 @@ from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
-from busplan.forms.numbers import period
+from busplan.forms.numbers import known_decimals, period
+from busplan.forms.numbers import known_text as _us
 from busplan.profile.edit import short_text
-from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
+from busplan.questions.base.sentences import change_meanings, checked_against, never_measured, settings_sentence
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.figures import (
     CapacityFigures,
@@ -178,10 +178,6 @@ def _setting(network: Network, now: CapacityFigures, change: Change) -> Change |
     return Change(values, change.nodes, figures(changed(target, values), model=now.timing_model))
 
 
-_DIGITS: Final = 3
-"""Significant digits of a time whose uncertainty is unknown."""
-_MOST_DECIMALS: Final = 6
-"""Most decimals of a time in us: below a picosecond there is only float rounding."""
 _Line = tuple[str, Sentence]
 
 
@@ -210,7 +206,8 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
     if not is_brief:
         lines += _basis(verdict)
     lines += _caveats(verdict)
-    return Card(subject, _word(verdict), _gauge(verdict), tuple(lines))
+    details = () if is_brief else tuple(_details(verdict))
+    return Card(subject, _word(verdict), _gauge(verdict), tuple(lines), details)
 
 
 def _word(verdict: Verdict) -> Words:
@@ -260,8 +257,7 @@ def _times(verdict: Verdict) -> Iterator[_Line]:
     uncertainty_us, margin_us = figures.uncertainty_us, figures.margin_corrected_us or 0.0
     used_us, whole = _used_us(figures), _us(given_us, None)
     whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
-    bias = f", {_us(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
-    yield "used", Sentence((f"{_us(used_us, uncertainty_us)} us of {whole}, {_percent(used_us / given_us)}{bias}",))
+    yield "used", Sentence((f"{_us(used_us, uncertainty_us)} us of {whole}, {_percent(used_us / given_us)}",))
     doubt = "" if uncertainty_us is None else f", +/- {_us(uncertainty_us, uncertainty_us)}"
     reserve_us = given_us * network.profile.limits.reserve
     reserve = f"; {_us(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
@@ -278,16 +274,16 @@ def _fastest(verdict: Verdict) -> Sentence:
         with_best = f"; {_rounded_up(verdict, best.period_us)} with {values}"
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
-        return Sentence((f"none as set{with_best}" if best else f"none: {why}",), "fails")
-    limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
-    as_set = " as set" if best else ""
-    return Sentence((f"{_rounded_up(verdict, fastest.us)}{as_set}{limited}{with_best}",))
+        return Sentence((f"none{with_best}" if best else f"none: {why}",), "fails")
+    limit = verdict.network.bus.limit(fastest.need.key)
+    limited = "" if fastest.need.key == TIME else f", limited by {(limit and limit.label) or fastest.need.key}"
+    return Sentence((f"{_rounded_up(verdict, fastest.us)}{limited}{with_best}",))
 
 
 def _rounded_up(verdict: Verdict, us: float) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not verdict.network.bus.periods.us:
-        scale = 10.0 ** _decimals(us, verdict.deciding.uncertainty_us)
+        scale = 10.0 ** known_decimals(us, verdict.deciding.uncertainty_us)
         us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
     return period(us)
 
@@ -328,7 +324,7 @@ def _buses(figures: CapacityFigures) -> Iterator[_Line]:
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:
-    """The largest part, and what the verdict assumes, leaves out, and was checked against."""
+    """The largest part and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
     figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
     if figures.terms:
         largest = max(figures.terms, key=lambda term: plain(term.us))
@@ -336,11 +332,10 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, {_percent(parts[0]['share'])} of the variance",))
-    if network.groups and figures.bias_us is None:
-        (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
-        uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
-        yield "bias", Sentence((f"none corrected{uncertainty}: {error}",))
+        part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, +/- {_us(part_us, figures.uncertainty_us)} us",))
+    if network.groups and figures.uncertainty_us is None:
+        yield "doubt", Sentence(("not known",), "warns")
     for assumption in verdict.assumptions:
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
@@ -348,7 +343,20 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
     if verdict.premises:
         yield "rests on", Sentence(("; ".join(verdict.premises),))
-    yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=bool(network.groups)),))
+    if network.groups and (never := never_measured(bus.evidence_for(network))):
+        yield "never measured", Sentence((never,))
+
+
+def _details(verdict: Verdict) -> Iterator[_Line]:
+    """What the answer needs only when somebody asks: the correction, the published figures, other models."""
+    figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
+    if figures.bias_us:
+        words = "in what is used: measured buses take so much longer than the timing model"
+        yield "correction", Sentence((f"{_us(figures.bias_us, None)} us {words}",))
+    elif network.groups and figures.bias_us is None:
+        (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
+        yield "correction", Sentence((f"none: {error}",))
+    yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=False),))
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
@@ -385,16 +393,3 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
 def _percent(share: float) -> str:
     return f"{share:.0%}".replace("%", " %")
 
-
-def _us(us: float, uncertainty_us: float | None) -> str:
-    """A time with as many digits as its uncertainty allows."""
-    return f"{us:.{_decimals(us, uncertainty_us)}f}"
-
-
-def _decimals(us: float, uncertainty_us: float | None) -> int:
-    """Decimals down to the first digit of the uncertainty; without one, for `_DIGITS` significant digits."""
-    if uncertainty_us and isfinite(uncertainty_us):
-        decimals = -floor(log10(uncertainty_us))
-    else:
-        decimals = _DIGITS - 1 - floor(log10(abs(us))) if us else 0
-    return min(max(0, decimals), _MOST_DECIMALS)
