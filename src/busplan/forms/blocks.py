@@ -264,6 +264,8 @@ class Detail(NamedTuple):
     blocks: "tuple[Block, ...]"
     adds: str = ""
     """What they are, for the last line of an answer without them; empty where nothing needs to be said."""
+    instead: "tuple[Block, ...]" = ()
+    """Blocks that any other answer shows in their place."""
 
 
 class Chapter(NamedTuple):
@@ -307,7 +309,7 @@ def first_drawing(blocks: Sequence[Block]) -> Drawing | None:
     """The first drawing of an answer; None if it has none."""
     for block in blocks:
         drawing = block.drawing if isinstance(block, Chart) else None
-        if isinstance(block, Chapter | Explorer):
+        if isinstance(block, Chapter | Detail | Explorer):
             drawing = first_drawing(block.blocks)
         if drawing is not None:
             return drawing

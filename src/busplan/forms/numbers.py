@@ -258,8 +258,8 @@ def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
 def _without_details(blocks: Sequence[Block], whole_by: str) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Detail):
-            continue
-        if isinstance(block, Chapter | Explorer):
+            yield from _without_details(block.instead, whole_by)
+        elif isinstance(block, Chapter | Explorer):
             yield block._replace(blocks=tuple(_without_details(block.blocks, whole_by)))
         elif isinstance(block, Table):
             numbers = [number for number, column in enumerate(block.columns) if not column.is_detail]

@@ -251,7 +251,8 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
         case Card():
             return _card_lines(block.whole if is_whole else block, width)
         case Detail():
-            return [*block_lines(block.blocks, width=width, is_whole=True)] if is_whole else []
+            blocks = block.blocks if is_whole else block.instead
+            return [*block_lines(blocks, width=width, is_whole=is_whole, whole_by=whole_by)]
         case Chapter() | Explorer():
             title = _caption(block.title if isinstance(block, Chapter) else None, width)
             return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole, whole_by=whole_by)]

@@ -24,6 +24,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
+from busplan.forms.numbers import known_decimals
 from busplan.profile.changes import KeyChanges
 from busplan.profile.edit import value_text
 from busplan.questions.fit.certainty import TIME
@@ -131,10 +132,16 @@ def margin_words(figures: FitFigures, network: Network) -> tuple[Part, ...]:
     return joined(*reasons, by=", and ").parts
 
 
-def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
-    """The corrected margin under the model that decides, with its uncertainty if that is known."""
-    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
-    return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
+def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[Part, ...]:
+    """The corrected margin under the model that decides, with its uncertainty if that is known, in its digits."""
+    margin_us, doubt_us = figures.margin_corrected_us, figures.uncertainty_us
+    margin, doubt = (
+        attribute_value(figure, figures)._replace(
+            decimals=known_decimals(margin_us or 0.0, doubt_us), **({} if unit else {"unit": ""})
+        )
+        for figure in (MARGIN_CORRECTED, UNCERTAINTY)
+    )
+    return (margin,) if doubt_us is None else (margin, " +/- ", doubt)
 
 
 def safety_record(figures: FitFigures, network: Network) -> Record:
