@@ -54,7 +54,7 @@ _COLUMNS: Final = (
     TableColumn("bus", kind="words", wraps=True),
     TableColumn("smallest period", "us"),
     TableColumn("most", group="safe axes"),
-    TableColumn("limited by", kind="words", group="safe axes", wraps=True),
+    TableColumn("limited by", kind="words", group="safe axes", rank=3, wraps=True),
     TableColumn(VERDICT.label, kind="words", wraps=True),
     TableColumn("margin", "us"),
     TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
@@ -120,7 +120,7 @@ def _blocks(answer: CompareAnswer) -> Iterator[Block]:
         caption = (
             "Assumed, by the profile, as a new profile of the kind has it or by default, until somebody knows better"
         )
-        yield Detail((Table(_ASSUMED, tuple(rows), Sentence((caption,))),), "what is assumed")
+        yield Detail((Table(_ASSUMED, tuple(rows), Sentence((caption,))),))
 
 
 def _headline(answer: CompareAnswer) -> Sentence:

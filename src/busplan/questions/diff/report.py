@@ -166,8 +166,9 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
         or (figure.judgement == "neutral" and None not in (figure.a, figure.b))
     ]
     if differ:
-        judged = any(figure.judgement != "neutral" for figure in differ)
-        rows = (_row(figure)._replace(is_detail=judged and figure.judgement == "neutral") for figure in differ)
+        deciding = {"plan", *(side.network.bus.deciding_model for side in (answer.a, answer.b))}
+        first = [figure for figure in differ if figure.judgement != "neutral" and figure.part in deciding] or differ
+        rows = (_row(figure)._replace(is_detail=figure not in first) for figure in differ)
         yield Table(_FIGURES, tuple(rows), heads=3)
 
 
