@@ -70,9 +70,7 @@ def capacity_command(
     """
     refused = NOTHING_REFUSED if sensitivity else _NO_PICTURE
     files = profile_files(profile)
-    with answer(
-        format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True, refused=refused
-    ) as give:
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True, refused=refused) as give:
         from busplan.questions.capacity import capacity
 
         loaded = load_changed(profile, changes)

@@ -66,9 +66,7 @@ def manual_command(
         emit_document(text)
 
 
-def profiles_command(
-    all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None
-) -> None:
+def profiles_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
     """List the shipped profiles, which every command takes by name.
 
     Each has its bus, nodes, axes and period; --all adds the description. Exits 0.

@@ -406,7 +406,12 @@ def github(report: CheckReport) -> str:
     lines = []
     paths = {file.path: _from_root(file.path) for file in report.files}
     for path, finding, _, _ in report.located:
-        place = {"file": paths.get(path, path), "line": finding.line, "col": finding.column, "title": f"{finding.code} {finding.rule}"}
+        place = {
+            "file": paths.get(path, path),
+            "line": finding.line,
+            "col": finding.column,
+            "title": f"{finding.code} {finding.rule}",
+        }
         properties = ",".join(
             f"{name}={_escaped(str(value)).replace(':', '%3A').replace(',', '%2C')}" for name, value in place.items()
         )

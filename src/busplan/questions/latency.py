@@ -255,21 +255,25 @@ def _tables(answer: LatencyAnswer) -> Iterator[Block]:
         columns = [
             FigureColumn(
                 TableColumn(
-                    transaction.timing_model, group=_name(transaction), is_detail=_is_beside(transaction, table, deciding)
+                    transaction.timing_model,
+                    group=_name(transaction),
+                    is_detail=_is_beside(transaction, table, deciding),
                 ),
                 transaction.phases,
             )
             for transaction in table
         ]
-        shown = {key for key in register.latency_shown or (figure.key for figure in figures)}
+        shown = set(register.latency_shown or (figure.key for figure in figures))
         yield figure_table(
             [(figure, 0) for figure in figures],
             columns,
             caption=caption,
             unit=False,
             hides_equations=True,
-            is_detail=lambda figure, shown=shown, table=table: figure.key not in shown  # type: ignore[misc]
-            or not any(transaction.phases[figure.key] for transaction in table),
+            is_detail=lambda figure, shown=shown, table=table: (
+                figure.key not in shown  # type: ignore[misc]
+                or not any(transaction.phases[figure.key] for transaction in table)
+            ),
         )
 
 

@@ -62,12 +62,10 @@ _GROUP_BY_OTHER: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_B
 """Figures of a group by another timing model."""
 _CERTAINTY: Final = (figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS)
 _VERDICT: Final = (figure.VERDICT, figure.FITS, *_CERTAINTY, *_GROUP_BY_DECIDING)
-_ALWAYS_SHOWN: Final = frozenset(row.key for row in (*_VERDICT, figure.AVAILABLE, figure.REQUIRED, figure.MARGIN))
-"""Keys of the figures that are always shown, as are the terms that take time; all others are details."""
 
 
 def _table(answer: CapacityAnswer) -> Table:
-    """Figures of all periods, the timing models side by side; figures that do not decide are details."""
+    """Figures of all periods, the timing models side by side."""
     network = answer.verdicts[0].network
     profile, bus = network.profile, network.bus
     setup = ", ".join(bus.setup_words(network))
@@ -77,17 +75,13 @@ def _table(answer: CapacityAnswer) -> Table:
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
     rows = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)]
-    shown = _ALWAYS_SHOWN | {term.key for figures in answer.results for term in figures.terms if term.us}
     if not profile.has_cycle:
         results = [figures.values() for figures in answer.results]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
-        shown |= {figure.key for figure in bus.figures.table}
     return figure_table(
         rows,
         list(_columns(answer)),
         caption=caption,
-        hides_equations=True,
-        is_detail=lambda figure: figure.key not in shown,
         state=_state,
     )
 

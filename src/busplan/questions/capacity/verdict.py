@@ -392,4 +392,3 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
 
 def _percent(share: float) -> str:
     return f"{share:.0%}".replace("%", " %")
-

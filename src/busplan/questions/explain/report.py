@@ -41,7 +41,8 @@ _INPUTS: Final = (
 )
 """Columns of an input, and of how well it is known."""
 _KNOWN: Final = tuple(
-    column._replace(is_detail=True) if column.heading == "source" else column._replace(leaves="out") for column in _INPUTS
+    column._replace(is_detail=True) if column.heading == "source" else column._replace(leaves="out")
+    for column in _INPUTS
 )
 """The same, the source only in a whole answer."""
 _MOST_INPUTS: Final = 8
@@ -202,7 +203,9 @@ def _last_step(derivation: Derivation) -> Iterator[Block]:
     if last is not None:
         yield Calculation((_step(last),))
         used = [step for step in before if re.search(rf"(?<!\w){re.escape(step.symbol)}(?!\w)", last.formula)]
-        rows = (TableRow((Code(step.symbol), _result(step.value, step.key, ""), step.unit, step.reference)) for step in used)
+        rows = (
+            TableRow((Code(step.symbol), _result(step.value, step.key, ""), step.unit, step.reference)) for step in used
+        )
         if used:
             yield Table(_USED, tuple(rows))
     known = (given for given in derivation.inputs if given.grade in GRADES[:-1])
