@@ -26,7 +26,9 @@ def did_you_mean(typed: str, names: Iterable[str]) -> str:
     """
     folded = {name.casefold(): name for name in names}
     begun = [name for name in folded if typed and name.startswith(typed.casefold())][:_MOST_NEAR]
-    close = begun or get_close_matches(typed.casefold(), folded, n=1)
+    close = (
+        [typed.casefold()] if typed.casefold() in folded else begun or get_close_matches(typed.casefold(), folded, 1)
+    )
     return f"did you mean {listed([folded[name] for name in close], 'or')}?" if close else ""
 
 

@@ -20,7 +20,6 @@ from busplan.profile.document import decode, validate
 from busplan.profile.sources import shipped_names
 from busplan.profile.starter import Machine, machine_text, shared_out
 
-
 SHIPPED = ("paper-4ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8")
 
 
