@@ -547,7 +547,10 @@ def test_init_writes_the_time_of_the_host_as_an_assumption(
     assert bus.master_doubt_us == master_us / 2
 
 
-@pytest.mark.parametrize(("kind", "words"), [("ethercat", "hardware, tuned, real-time, stock"), ("can", "no host")])
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("ethercat", "hardware, tuned, real-time, stock"), ("can", "goes with --bus ethercat, not with can")],
+)
 def test_init_knows_the_hosts_of_a_kind(run: Run, tmp_path: Path, kind: str, words: str) -> None:
     done = run("init", "press", "--bus", kind, "--host", "abacus", cwd=tmp_path)
     assert (done.returncode, words in done.stderr) == (2, True)
