@@ -135,12 +135,9 @@ def margin_words(figures: FitFigures, network: Network) -> tuple[Part, ...]:
 def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[Part, ...]:
     """The corrected margin under the model that decides, with its uncertainty if that is known, in its digits."""
     margin_us, doubt_us = figures.margin_corrected_us, figures.uncertainty_us
-    margin, doubt = (
-        attribute_value(figure, figures)._replace(
-            decimals=known_decimals(margin_us or 0.0, doubt_us), **({} if unit else {"unit": ""})
-        )
-        for figure in (MARGIN_CORRECTED, UNCERTAINTY)
-    )
+    shown = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
+    decimals = known_decimals(margin_us or 0.0, doubt_us)
+    margin, doubt = (value._replace(decimals=decimals, unit=value.unit if unit else "") for value in shown)
     return (margin,) if doubt_us is None else (margin, " +/- ", doubt)
 
 
