@@ -3,9 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
+_MOST_NEAR = 3
+"""Most names that are asked about."""
+
 
 def did_you_mean(typed: str, names: Iterable[str]) -> str:
-    """Ask whether the nearest name was meant; empty if none is near.
+    """Ask whether the nearest name was meant, or the ones that begin so; empty if none is near.
 
     Parameters
     ----------
@@ -18,10 +21,15 @@ def did_you_mean(typed: str, names: Iterable[str]) -> str:
     --------
     >>> did_you_mean("capcity", ["capacity", "latency"]), did_you_mean("x", ["capacity"])
     ('did you mean capacity?', '')
+    >>> did_you_mean("cap", ["capacity", "latency"]), did_you_mean("ma", ["manual", "map"])
+    ('did you mean capacity?', 'did you mean manual or map?')
     """
     folded = {name.casefold(): name for name in names}
-    close = get_close_matches(typed.casefold(), folded, n=1)
-    return f"did you mean {folded[close[0]]}?" if close else ""
+    begun = [name for name in folded if typed and name.startswith(typed.casefold())][:_MOST_NEAR]
+    close = (
+        [typed.casefold()] if typed.casefold() in folded else begun or get_close_matches(typed.casefold(), folded, 1)
+    )
+    return f"did you mean {listed([folded[name] for name in close], 'or')}?" if close else ""
 
 
 def has_controls(text: str) -> bool:

@@ -109,7 +109,7 @@ def test_a_step_that_does_not_divide_the_period_is_a_shorter_one_that_does(circl
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--plot", "c.pdf"], "expected a name ending in .svg, .png; for a PDF write .svg: a browser prints it"),
+        (["-o", "c.pdf"], "for a PDF write .svg: a browser prints it"),
         (["--trace", "no/where/t.csv"], "cannot be written"),
         (["--trace", "."], "cannot be written"),
         (["--every", "5"], "goes with --trace"),
@@ -133,23 +133,25 @@ def test_bad_input_is_exit_2_with_one_message_and_no_file(
 def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(circle_test: Run, profile: Path) -> None:
     old = profile.parent / "c.png"
     old.write_bytes(b"old")
-    run = circle_test(profile, "--plot", "c.png", "--period", "100us", "--format", "json", cwd=profile.parent)
-    assert run.returncode == 1
-    assert "nothing to draw" in run.stderr
+    run = circle_test(profile, "-o", "c.png", "--period", "100us", cwd=profile.parent)
+    assert run.returncode == 2
+    assert "nothing to draw: no period fits the bus" in run.stderr
     assert "wrote" not in run.stderr
-    assert json.loads(run.stdout)["results"][0]["failures"][0]["name"] == "required_us"
+    said = circle_test(profile, "--period", "100us", cwd=profile.parent)
+    assert (said.returncode, said.stdout.count("\n"), "NOT RUN" in said.stdout) == (1, 1, True)
     assert old.read_bytes() == b"old"
     assert len(list(profile.parent.iterdir())) == 2
 
 
 def test_the_report_the_trace_and_the_plot_go_to_their_files(circle_test: Run, profile: Path) -> None:
-    files = ("-o", "report.md", "--trace", "t.csv", "--every", "1000", "--plot", "c.svg")
+    files = ("-o", "report.md", "--trace", "t.csv", "--every", "1000")
     run = circle_test(profile, *files, cwd=profile.parent)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "", "wrote t.csv\nwrote c.svg\nwrote report.md\n")
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "wrote t.csv\nwrote report.md\n")
     assert "### Circle test of `quick`\n" in (profile.parent / "report.md").read_text(encoding="utf-8")
     for name, start in (("c.png", b"\x89PNG"), ("c.svg", b"<svg")):
-        assert circle_test(profile, "--plot", name, cwd=profile.parent).stderr == f"wrote {name}\n"
+        assert circle_test(profile, "-o", name, cwd=profile.parent).stderr == f"wrote {name}\n"
         assert (profile.parent / name).read_bytes().startswith(start)
+    assert "path, its error magnified" in (profile.parent / "c.svg").read_text(encoding="utf-8")
 
 
 def test_a_broken_resvg_is_said_before_the_simulation(run: Run, profile: Path) -> None:
@@ -157,7 +159,7 @@ def test_a_broken_resvg_is_said_before_the_simulation(run: Run, profile: Path) -
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("raise RuntimeError('wrong ABI')", encoding="utf-8")
     broken = ("-c", "import sys; sys.path.insert(0, 'broken'); from busplan.__main__ import main; main()")
-    done = run("circle-test", profile.name, "--plot", "c.png", cwd=profile.parent, python=broken)
+    done = run("circle-test", profile.name, "-o", "c.png", cwd=profile.parent, python=broken)
     assert done.returncode == 2
     assert "does not load (RuntimeError: wrong ABI)" in done.stderr
     assert not (profile.parent / "c.png").exists()

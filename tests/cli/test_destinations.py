@@ -59,7 +59,7 @@ TWICE = {
     "--output a.svg and --plot a.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "a.svg", "--plot", "a.svg"),
     "--output new.svg and --plot lost.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "new.svg", "--plot", "lost.svg"),
     "--output a.svg and --plot A.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "a.svg", "--plot", "A.svg"),
-    "--trace a.svg and --plot ./a.svg": ("circle-test", "x.csv", "--trace", "a.svg", "--plot", "./a.svg"),
+    "--output ./a.svg and --trace a.svg": ("circle-test", "x.csv", "--trace", "a.svg", "-o", "./a.svg"),
     "--output b.json and --baseline b.json": (
         "check", "x.csv", "--baseline", "b.json", "--update-baseline", "-o", "b.json",
     ),

@@ -365,7 +365,7 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     assert (one.safe_nodes, one.safe_limited_by, one.safe_min_period_us) == (one.max_nodes, "time", one.min_period_us)
     said = run("capacity", ring.name, cwd=ring.parent).stdout
     assert "\n  free            100 us\n" in said
-    assert "\n  bias            none corrected, no uncertainty given: how far the bus is from this" in said
+    assert "\n  doubt           not known\n" in said
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1200"), encoding="utf-8")
     assert "no bias or uncertainty known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
     rows = list(csv.DictReader(StringIO(run("capacity", ring.name, "--format", "csv", cwd=ring.parent).stdout)))
@@ -418,11 +418,11 @@ def test_doubts_without_a_bias_make_three_verdicts(
     assert (one.verdict, one.bias_us) == (verdict, None)
     assert one.uncertainty_us == pytest.approx(DOUBT_US)
     assert one.fits == (slice_us >= NEEDED_US)
-    said = run("capacity", doubted.name, cwd=doubted.parent).stdout
+    said = run("capacity", doubted.name, "--all", cwd=doubted.parent).stdout
     assert said.splitlines()[0].endswith(f" {verdict.upper()}")
     assert "us, +/- 13\n" in said
-    assert "\n  largest doubt   rate, 98 % of the variance\n" in said  # 6.4 squared of 41.96
-    assert "\n  bias            none corrected: how far the bus is from this timing model is not known\n" in said
+    assert "\n  largest doubt   rate, +/- 13 us\n" in said  # 2 * 6.4
+    assert "\n  correction      none: how far the bus is from this timing model is not known\n" in said
     assert "\n  rests on        no guard time, no slower execution, no other traffic\n" in said
     done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
     assert done.returncode == code

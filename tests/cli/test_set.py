@@ -249,7 +249,7 @@ def test_the_commands_of_a_page_repeat_the_changes(run: Run, shell: Run, folder:
 def test_a_picture_says_the_changes(run: Run, folder: Path) -> None:
     picture = run("timeline", "mine.toml", "--set", "bus.speed=S200", "--format", "svg", cwd=folder).stdout
     assert "With --set bus.speed" in picture
-    run("circle-test", "mine.toml", "--set", "bus.speed=S200", "--plot", "c.svg", cwd=folder)
+    run("circle-test", "mine.toml", "--set", "bus.speed=S200", "-o", "c.svg", cwd=folder)
     run("sweep", "mine.toml", "--vary", "bus.nodes=1:3", "--set", "bus.speed=S200", "--plot", "s.svg", cwd=folder)
     for name, said in (("c.svg", "--set bus.speed=S200"), ("s.svg", "mine, --set bus.speed=S200")):
         assert said in (folder / name).read_text(encoding="utf-8")

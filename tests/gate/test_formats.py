@@ -350,6 +350,17 @@ def test_github_commands_say_file_line_and_message(mixed: Answer) -> None:
     assert commands[0][2] == mixed.files[1].findings[0].message
 
 
+def test_github_has_paths_from_the_root_of_the_working_tree(tmp_path: Path) -> None:
+    (tmp_path / "tree" / ".git").mkdir(parents=True)
+    for folder, said in (("tree/deep", "deep/p.toml"), ("beside", "p.toml")):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "p.toml").write_text(FAILS, encoding="utf-8")
+        with chdir(tmp_path / folder):
+            lines = render(busplan.check("p.toml"), file_format="github").splitlines()
+        assert lines
+        assert {github_command(line)[1]["file"] for line in lines} == {said}
+
+
 @pytest.mark.parametrize("name", ["100% of, it: a\r\nb.toml", "::error::a.toml", "%0A.toml", "a,line=9.toml"])
 def test_github_reads_hostile_names_as_they_are(name: str, warned: Answer) -> None:
     finding = finding_at(warned, 3, 4, 5, words=f"{name}: unknown")

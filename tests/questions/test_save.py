@@ -29,7 +29,7 @@ FILES = [
 @pytest.mark.parametrize(("command", "ending"), FILES)
 def test_a_file_has_the_bytes_that_the_command_writes(command: str, ending: str, run: Run, tmp_path: Path) -> None:
     theirs, ours = tmp_path / f"theirs{ending}", tmp_path / f"ours{ending.upper()}"
-    is_plot = command.startswith(("sweep", "circle")) and ending in PICTURES
+    is_plot = command.startswith("sweep") and ending in PICTURES
     run(*command.split(), "--plot" if is_plot else "-o", str(theirs), cwd=tmp_path)
     ours.write_text("old")
     COMMANDS[command]().save(ours)

@@ -347,6 +347,8 @@ class BusFigures(NamedTuple):
     """Keys of the kind's figures that `plan` shows for each option."""
     latency_rows: tuple[Figure, ...] = ()
     """Rows of the table of `latency`, where they are not the terms."""
+    latency_shown: tuple[str, ...] = ()
+    """Keys of the rows that any answer shows; all where it is empty."""
     latency_document: tuple[Figure, ...] = ()
     """Figures of `latency`, in the order of its document, where it has more than those rows."""
     has_many_transactions: bool = False

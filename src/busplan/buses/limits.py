@@ -115,6 +115,8 @@ class Limit(NamedTuple):
     """Whether a rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
     is_slow: bool = False
     """Whether its value and period are slow to compute, and of plain numbers: it is evaluated last."""
+    label: str = ""
+    """What limits, in a few words, where the key does not say it."""
 
     of_deadlines: bool = False
     """Whether it must be kept for messages to be shown to keep their deadlines."""
@@ -488,5 +490,5 @@ NODE_LIMIT: Final = share_of_period(
     share=lambda _network: 1,
     doubt=lambda network: (_busiest_us(network, COVERAGE) - _busiest_us(network, -COVERAGE)) / 2 / COVERAGE,
     way_out="a longer period or a faster node would do",
-)
+)._replace(label="the execution time of a node")
 """T_exec(read) + T_exec(write) + both worst extras <= n T_s, of every group with data in every n-th cycle."""

@@ -1,14 +1,14 @@
 """Commands that analyse a profile: capacity, latency, circle-test, timeline, explain and report."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from busplan.cli.answering import answer, profile_files, require_apart
+from busplan.cli.answering import NOTHING_REFUSED, answer, profile_files, require_apart
 from busplan.cli.options import (
     ALL_MODELS,
     AllOption,
@@ -27,15 +27,14 @@ from busplan.cli.options import (
     load_each,
     parse_sizes,
     periods_us,
-    plot_form,
     require_company,
     takes_changes,
     time_us,
 )
 from busplan.cli.output import PlanFailsError, progress_bar, say
 from busplan.errors import BusplanError
-from busplan.files import document_bytes, new_file
-from busplan.forms import Form
+from busplan.files import new_file
+from busplan.forms import PICTURES, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges, change_options, period_option, shell_word
 
 if TYPE_CHECKING:
@@ -51,14 +50,14 @@ def capacity_command(
     timing_model: TimingModelOption = "both",
     sensitivity: bool = False,
     all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
-    It begins with a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on
-    this bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
-    change. The figures follow; a low terminal shows them with --all. Times are in us. Exits 0 with any verdict.
+    It prints a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on this
+    bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
+    change. --all adds every figure behind it. Times are in us. Exits 0 with any verdict.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
 
@@ -66,9 +65,12 @@ def capacity_command(
     ----------
     --sensitivity
         Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or one retry
-        more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these rows instead.
+        more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these rows instead, and
+        a picture their bars.
     """
-    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+    refused = NOTHING_REFUSED if sensitivity else _NO_PICTURE
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True, refused=refused) as give:
         from busplan.questions.capacity import capacity
 
         loaded = load_changed(profile, changes)
@@ -81,6 +83,11 @@ def capacity_command(
         give(result.report()._replace(next_commands=_next_commands(str(profile), result, changes)))
 
 
+_NO_PICTURE: Final[dict[DrawnForm, str]] = dict.fromkeys(
+    PICTURES.values(), "capacity draws what moves the margin; give --sensitivity, too"
+)
+
+
 def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
     """Commands to run next for the same profile."""
     from busplan.forms.blocks import Command
@@ -89,7 +96,8 @@ def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges)
     tried = period_option(periods[0]) if len(periods) == 1 and periods[0] != profile_us else ()
     changed = " ".join((shell_word(argument), *change_options(changes, period_us=profile_us), *tried))
     second = "circle-test" if all(verdict.all_well for verdict in result.verdicts) else "plan"
-    commands = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
+    more = "--all" if result.sensitivities else "--sensitivity"
+    commands = (f"capacity {changed} {more}", f"{second} {changed}", f"report {changed}")
     return tuple(Command(f"busplan {command}") for command in commands)
 
 
@@ -138,10 +146,9 @@ def circle_test_command(
     contributions: bool = False,
     trace: Path | None = None,
     every: Annotated[int | None, typer.Option(min=1)] = None,
-    plot: Path | None = None,
     all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
 ) -> None:
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 
@@ -149,7 +156,8 @@ def circle_test_command(
     loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: without any,
     the circle is not judged, nor below 0.1 um, where no error source of the profile matters. Errors are in um in the
     table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4, and circle.path = "iso230-4" measures
-    them on a whole turn. Exits 0 when the test passes or the circle is not judged, and 1 when it fails.
+    them on a whole turn. A picture shows the magnified polar error, the error over time and the ranked error sources,
+    with tolerances. Exits 0 when the test passes or the circle is not judged, and 1 when it fails.
 
     Example: busplan circle-test paper-4ms --contributions
 
@@ -162,38 +170,23 @@ def circle_test_command(
         [default: no file]
     --every N
         Write one of N steps of the simulation to --trace. [default: 10]
-    --plot FILE
-        Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, into FILE.svg
-        or FILE.png; an old file is replaced. PNG needs the extra plot (resvg-py). [default: no figure]
     """
     require_company("--trace FILE.csv", {"--every": every}, is_given=trace)
-    require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
-    form = None if plot is None else plot_form(plot)
-    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+    files = list(profile_files(profile))
+    require_apart({"--output": output, "--trace": trace}, inputs=files)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
         from busplan.questions.circle import circle_test
 
         loaded = load_changed(profile, changes)
         periods = periods_us(period, loaded)
-        with ExitStack() as files:
+        with new_file(trace, overwrite=True) if trace else nullcontext() as trace_file:
             # Opened before the simulation, so that a path that cannot be written fails at once.
-            trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
-            plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
             with _naming(profile, period), progress_bar("circle test") as progress:
                 test = circle_test(loaded, period_us=periods, contributions=contributions, progress=progress)
             if trace_file is not None:
                 trace_file.writelines(block.encode() for block in test.trace_csv(every=every or 10))
-            if plot_file is not None and form is not None and any(test.runs):
-                from busplan.forms.svg import content
-
-                plot_file.write(document_bytes(content(test.drawing(), form, note=changes.words)))
-            elif plot_file is not None:
-                plot_file.abandon()
         if trace is not None:
             say(f"wrote {trace}")
-        if plot is not None and any(test.runs):
-            say(f"wrote {plot}")
-        elif plot is not None:
-            say(f"{plot}: not written: no period fits the bus, so there is nothing to draw")
         give(test)
     if test.passed is False:
         raise PlanFailsError

@@ -91,7 +91,7 @@ def _give(
     shown: "Answer | Report", form: DrawnForm, file: NewFile | None, changes: KeyChanges, *, is_whole: bool
 ) -> None:
     """Write an answer as a picture or as a report, with the --set options named."""
-    from busplan.forms.blocks import Report
+    from busplan.forms.blocks import Report, first_drawing
     from busplan.questions.base.sentences import changed_report, changes_sentences
 
     match form:
@@ -99,10 +99,11 @@ def _give(
             from busplan.forms.numbers import sentence_text
             from busplan.forms.svg import content
 
-            if isinstance(shown, Report):
-                raise TypeError("a report has no picture")
+            drawing = first_drawing(shown.blocks) if isinstance(shown, Report) else shown.drawing()
+            if drawing is None:
+                raise BusplanError(f"--format {form}: there is nothing to draw")
             note = " ".join(map(sentence_text, changes_sentences(changes)))
-            write_document(content(shown.drawing(), form, note=note), file)
+            write_document(content(drawing, form, note=note), file)
         case _:
             report = changed_report(shown if isinstance(shown, Report) else shown.report(), changes)
             write_report(report._replace(is_whole=is_whole or report.is_whole), form, file)
@@ -114,8 +115,8 @@ def write_report(report: "Report", form: Form, file: NewFile | None) -> None:
     if form == "table" and file is None:
         from busplan.forms import terminal
 
-        width, height = terminal_size() or (None, None)
-        emit_pages(terminal.text(report, width=width, height=height, styled=is_styled()))
+        width, _ = terminal_size() or (None, None)
+        emit_pages(terminal.text(report, width=width, styled=is_styled()))
     else:
         write_document(render(report, form), file)
 

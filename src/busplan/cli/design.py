@@ -380,8 +380,8 @@ def emulate_command(
     faults, endings, *_ = emulator_of(plan)
     if output is not None and output.suffix.lower() not in endings:
         raise BusplanError(f"--output {output}: {ending_expected(output.suffix, endings)}")
-    if output is None and ".pcapng" in endings and sys.stdout.isatty():
-        raise BusplanError("a capture is not for a terminal; give -o FILE.pcapng, or use a pipe")
+    if output is None and sys.stdout.isatty():
+        raise BusplanError(f"a recording is not for a terminal; give -o FILE{endings[0]}, or use a pipe")
     length_us = None if duration is None else time_us(duration, option="--duration")
     units = {known.name: known.unit for known in faults}
     given = dict(_fault(text, units) for text in fault or [])

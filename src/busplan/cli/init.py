@@ -11,6 +11,7 @@ import typer
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.cli.options import complete_profile, option, time_us
 from busplan.cli.output import message_width, say
+from busplan.english import listed
 from busplan.errors import BusplanError
 from busplan.files import write_file
 
@@ -84,8 +85,8 @@ def init_command(
     --bytes-per-axis N
         Payload of each axis, in either direction [bytes]. [default: 8]
     --host HOST
-        Kind of host, from which its own time is assumed; for EtherCAT hardware, tuned, real-time or stock. [default:
-        tuned]
+        Host of an EtherCAT bus, from which its own time is assumed: hardware, tuned, real-time or stock; other kinds
+        have no choice of hosts. [default: tuned]
     --bit-rate N
         Bit rate of CAN [kbit/s]. [default: 1000, assumed]
     --force
@@ -239,8 +240,9 @@ def _machine(kind: str, values: _Values) -> "Machine":
             say(*(f"{name}: {' '.join(lines.partition(chr(10))[0].split())}" for name, lines in starter.hosts.items()))
         host = values.value("--host", f"Host of the master: {', '.join(starter.hosts)}", starter.host)
     if host is not None and host not in starter.hosts:
-        hosts = f"there are {', '.join(starter.hosts)}" if starter.hosts else f"a profile of kind {kind} has no host"
-        raise BusplanError(f"--host {host}: {hosts}")
+        kinds = listed([name for name in kind_names() if kind_named(name).starter.hosts], "or")
+        known = f"there are {', '.join(starter.hosts)}"
+        raise BusplanError(f"--host {host}: {known if starter.hosts else f'goes with --bus {kinds}, not with {kind}'}")
     return Machine(groups, period_us, size, host, rate=_rate(kind, values))
 
 

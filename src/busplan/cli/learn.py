@@ -66,14 +66,14 @@ def manual_command(
         emit_document(text)
 
 
-def profiles_command(format_: FormatOption = None, output: OutputOption = None) -> None:
+def profiles_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
     """List the shipped profiles, which every command takes by name.
 
-    Each has its number of nodes, its period, its leading timing model and a description. Exits 0.
+    Each has its bus, nodes, axes and period; --all adds the description. Exits 0.
 
     Example: busplan profiles
     """
-    with answer(format_, output) as give:
+    with answer(format_, output, is_whole=all_) as give:
         from busplan.profile.sources import load, shipped_names
 
         give(_profiles_report([load(name).profile for name in shipped_names()]))
@@ -81,22 +81,31 @@ def profiles_command(format_: FormatOption = None, output: OutputOption = None) 
 
 def _profiles_report(profiles: "list[Profile]") -> "Report":
     """Name, main figures and description of each profile."""
-    from busplan.english import nouns
-    from busplan.forms.blocks import Chapter, Code, Report, Sentence, count_value, sentence
-    from busplan.forms.numbers import period_value
+    from busplan.buses.figure import AXES, NODES
+    from busplan.forms.blocks import Code, Report, Sentence, Table, TableColumn, TableRow, count_value
+    from busplan.forms.numbers import period
     from busplan.questions.base.sentences import document
+    from busplan.questions.fit.network import network_of
 
-    records, chapters = [], []
+    records, rows = [], []
     for profile in profiles:
-        nodes = sum(group.nodes for group in profile.node_groups)
+        network, groups = network_of(profile), profile.node_groups
+        nodes, axes = sum(group.nodes for group in groups), sum(group.nodes * group.node.axes for group in groups)
         description = " ".join(profile.description.split())
         period_us: Any = profile.cycle.period_us if profile.has_cycle else None
-        figures = {"name": profile.name, "nodes": nodes, "period_us": period_us}
+        title = network.bus.title_of(network)
+        figures = {"name": profile.name, "bus": title, "nodes": nodes, "axes": axes, "period_us": period_us}
         records.append({**figures, "description": description})
-        words = f"{{}}: {{}} {nouns(nodes, 'node')} at {{}}"
-        title = sentence(words, Code(profile.name), count_value(nodes, "nodes"), period_value(period_us))
-        chapters.append(Chapter(title, (Sentence((description,)),)))
-    return Report(Sentence(("Shipped profiles",)), chapters, document("profiles", profiles=records), records)
+        at = period(period_us) if period_us else ""
+        counts = (count_value(nodes, NODES.key), count_value(axes, AXES.key))
+        rows.append(TableRow((Code(profile.name), title, *counts, at, description)))
+    columns = (
+        *(TableColumn(heading, kind="words") for heading in ("profile", "bus")),
+        *(TableColumn(heading) for heading in ("nodes", "axes", "period")),
+        TableColumn("what it is", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
+    )
+    table = Table(columns, tuple(rows), Sentence(("Shipped profiles",)))
+    return Report(Sentence(("Shipped profiles",)), (table,), document("profiles", profiles=records), records)
 
 
 def complete_kind(incomplete: str) -> list[str]:

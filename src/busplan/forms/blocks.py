@@ -224,6 +224,13 @@ class Card(NamedTuple):
     verdict: Words
     gauge: Gauge | None
     lines: tuple[tuple[str, Sentence], ...]
+    details: tuple[tuple[str, Sentence], ...] = ()
+    """Further lines, which only a whole answer shows."""
+
+    @property
+    def whole(self) -> "Card":
+        """The card with all its lines."""
+        return self._replace(lines=(*self.lines, *self.details), details=())
 
 
 class Slider(NamedTuple):
@@ -255,6 +262,10 @@ class Detail(NamedTuple):
     """Blocks that only a whole answer shows."""
 
     blocks: "tuple[Block, ...]"
+    adds: str = ""
+    """What they are, for the last line of an answer without them; empty where nothing needs to be said."""
+    instead: "tuple[Block, ...]" = ()
+    """Blocks that any other answer shows in their place."""
 
 
 class Chapter(NamedTuple):
@@ -292,15 +303,13 @@ class Report(NamedTuple):
     """What to ask next."""
     whole_by: str = ""
     """Says how the reader sees the details that tables leave out; empty in a file."""
-    is_card_enough: bool = False
-    """If True, a terminal too low for all of it shows no more than its cards."""
 
 
 def first_drawing(blocks: Sequence[Block]) -> Drawing | None:
     """The first drawing of an answer; None if it has none."""
     for block in blocks:
         drawing = block.drawing if isinstance(block, Chart) else None
-        if isinstance(block, Chapter | Explorer):
+        if isinstance(block, Chapter | Detail | Explorer):
             drawing = first_drawing(block.blocks)
         if drawing is not None:
             return drawing

@@ -1,14 +1,15 @@
 """Figures, cells and sentences as plain text."""
 
 from collections.abc import Iterator, Sequence
-from math import isnan
+from math import floor, isfinite, isnan, log10
 from typing import Final
 
 from busplan.buses.figure import unit_of
-from busplan.english import nouns, printable
+from busplan.english import listed, nouns, printable
 from busplan.forms.blocks import (
     Bar,
     Block,
+    Card,
     Cell,
     Chapter,
     Detail,
@@ -85,17 +86,56 @@ def unit_text(value: ShownValue) -> str:
 
 
 def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
-    """Write a number with fixed decimals; one too small for them is written with three digits.
+    """Write a number with fixed decimals, below 0 to tens and hundreds; one too small has three digits.
 
     Examples
     --------
     >>> decimals_of(205.91747, 3), decimals_of(0.0, 3), decimals_of(0.00012, 3), decimals_of(2.5, 1, signed=True)
     ('205.917', '0.000', '0.00012', '+2.5')
+    >>> decimals_of(6764.2, -1)
+    '6760'
     """
     sign = "+" if signed and number > 0 else ""
+    if decimals < 0:
+        return f"{sign}{round(number, decimals):.0f}"
     if number == 0 or abs(number) >= 10.0**-decimals:
         return f"{sign}{number:.{decimals}f}"
     return f"{sign}{number:.3g}"
+
+
+_UNKNOWN_DIGITS: Final = 3
+"""Significant digits of a number whose uncertainty is unknown."""
+_MOST_DECIMALS: Final = 6
+"""Most decimals of a time in us: below a picosecond there is only float rounding."""
+_TWO_DIGITS: Final = 100.0
+"""Uncertainty from which on it has two digits, and not one or all before the decimal point."""
+
+
+def known_decimals(number: float, uncertainty: float | None) -> int:
+    """Decimals of a number that its uncertainty allows, below 0 for tens and hundreds; without one, three digits.
+
+    Examples
+    --------
+    >>> known_decimals(6764.2, 424.0), known_decimals(461.4, 56.8), known_decimals(73.31, 0.42)
+    (-1, 0, 1)
+    """
+    if uncertainty and isfinite(uncertainty):
+        place = floor(log10(uncertainty))
+        return min(1 - place if uncertainty >= _TWO_DIGITS else max(0, -place), _MOST_DECIMALS)
+    decimals = _UNKNOWN_DIGITS - 1 - floor(log10(abs(number))) if number else 0
+    return min(max(0, decimals), _MOST_DECIMALS)
+
+
+def known_text(number: float, uncertainty: float | None) -> str:
+    """Write a number with as many digits as its uncertainty allows, never as a power of ten.
+
+    Examples
+    --------
+    >>> known_text(6764.2, 424.0), known_text(370.4, 370.4), known_text(0.0123456, None)
+    ('6760', '370', '0.0123')
+    """
+    decimals = known_decimals(number, uncertainty)
+    return f"{round(number, decimals):.{max(0, decimals)}f}"
 
 
 def period_value(period_us: float) -> ShownValue:
@@ -184,13 +224,31 @@ def shown_blocks(report: Report) -> Sequence[Block]:
         The answer.
     """
     blocks = report.blocks
-    return list(_with_details(blocks) if report.is_whole else _without_details(blocks, report.whole_by))
+    if report.is_whole:
+        return list(_with_details(blocks))
+    return [*_without_details(blocks, report.whole_by), *not_shown(report)]
+
+
+def not_shown(report: Report) -> tuple[Sentence, ...]:
+    """The last line of an answer that is not whole: which blocks it leaves out, and how to see them."""
+    words = [] if report.is_whole else list(dict.fromkeys(_adds(report.blocks)))
+    return (Sentence((f"Not shown: {listed(words, 'and')}. {report.whole_by}".rstrip(),)),) if words else ()
+
+
+def _adds(blocks: Sequence[Block]) -> Iterator[str]:
+    for block in blocks:
+        if isinstance(block, Detail) and block.adds:
+            yield block.adds
+        elif isinstance(block, Chapter | Explorer):
+            yield from _adds(block.blocks)
 
 
 def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Detail):
             yield from _with_details(block.blocks)
+        elif isinstance(block, Card):
+            yield block.whole
         elif isinstance(block, Chapter | Explorer):
             yield block._replace(blocks=tuple(_with_details(block.blocks)))
         else:
@@ -200,8 +258,8 @@ def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
 def _without_details(blocks: Sequence[Block], whole_by: str) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Detail):
-            continue
-        if isinstance(block, Chapter | Explorer):
+            yield from _without_details(block.instead, whole_by)
+        elif isinstance(block, Chapter | Explorer):
             yield block._replace(blocks=tuple(_without_details(block.blocks, whole_by)))
         elif isinstance(block, Table):
             numbers = [number for number, column in enumerate(block.columns) if not column.is_detail]

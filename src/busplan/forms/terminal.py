@@ -24,7 +24,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Lane, Lanes, Panel, Ruler, legend
 from busplan.forms.lines import BLANK, Line, Mark, legend_lines, plain_text, styled_text, wrapped
-from busplan.forms.numbers import sentence_line, with_unit
+from busplan.forms.numbers import not_shown, sentence_line, with_unit
 from busplan.forms.scale import placed
 from busplan.forms.text_table import table_lines
 
@@ -173,7 +173,7 @@ def _cells(lane: Lane, ruler: Ruler, columns: int) -> str:
     return "".join(max(part, key=lambda mark: part[mark]) if part else " " for part in parts)
 
 
-def text(report: Report, *, width: int | None = None, height: int | None = None, styled: bool = False) -> str:
+def text(report: Report, *, width: int | None = None, styled: bool = False) -> str:
     """Write an answer as lines of text.
 
     Parameters
@@ -182,8 +182,6 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
         The answer.
     width
         Width of the terminal, in columns; None without one: then no line is wrapped and no table narrowed.
-    height
-        Lines of the terminal; where all of an answer does not fit, it may be its cards alone.
     styled
         If True, write the colours of a terminal.
     """
@@ -194,12 +192,9 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
         names = ("next", *("" for _ in report.next_commands))
         commands = zip(names, (Sentence((command.line,)) for command in report.next_commands), strict=False)
         blocks[last] = card._replace(lines=(*card.lines, *commands))
+    blocks += not_shown(report)
     shown = [Chapter(report.title, tuple(blocks))] if report.is_page else blocks
     lines = [*block_lines(shown, width=width, is_whole=report.is_whole, whole_by=report.whole_by)]
-    # The shell's prompt takes a line.
-    folds = report.is_card_enough and not report.is_whole
-    if folds and height is not None and last is not None and len(lines) >= height:
-        lines = [*block_lines(blocks[: last + 1], width=width), Line("--all shows the figures behind it.")]
     return styled_text(lines) if styled else plain_text(lines)
 
 
@@ -254,9 +249,10 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
         case Calculation():
             return [line for number, step in enumerate(block.steps, start=1) for line in _step(number, step, width)]
         case Card():
-            return _card_lines(block, width)
+            return _card_lines(block.whole if is_whole else block, width)
         case Detail():
-            return [*block_lines(block.blocks, width=width, is_whole=True)] if is_whole else []
+            blocks = block.blocks if is_whole else block.instead
+            return [*block_lines(blocks, width=width, is_whole=is_whole, whole_by=whole_by)]
         case Chapter() | Explorer():
             title = _caption(block.title if isinstance(block, Chapter) else None, width)
             return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole, whole_by=whole_by)]

@@ -402,15 +402,31 @@ def _artifact(path: str) -> dict[str, str]:
 
 
 def github(report: CheckReport) -> str:
-    """One workflow command for each finding, which GitHub shows next to the line of the file."""
+    """One workflow command for each finding, which GitHub shows next to the line of the file, from the root."""
     lines = []
+    paths = {file.path: _from_root(file.path) for file in report.files}
     for path, finding, _, _ in report.located:
-        place = {"file": path, "line": finding.line, "col": finding.column, "title": f"{finding.code} {finding.rule}"}
+        place = {
+            "file": paths.get(path, path),
+            "line": finding.line,
+            "col": finding.column,
+            "title": f"{finding.code} {finding.rule}",
+        }
         properties = ",".join(
             f"{name}={_escaped(str(value)).replace(':', '%3A').replace(',', '%2C')}" for name, value in place.items()
         )
         lines.append(f"::{finding.severity} {properties}::{_escaped(finding.message)}\n")
     return "".join(lines)
+
+
+def _from_root(path: str) -> str:
+    """Path of a file from the root of its git working tree; as it is for no file, or outside of one."""
+    try:
+        whole = Path(os.path.abspath(path))  # noqa: PTH100 - a link keeps its own name
+        root = next(folder for folder in whole.parents if (folder / ".git").exists())
+        return whole.relative_to(root).as_posix() if whole.exists() else path
+    except (OSError, StopIteration, ValueError):
+        return path
 
 
 def _escaped(text: str) -> str:

@@ -13,6 +13,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Block,
     Code,
+    Detail,
     Record,
     Report,
     Sentence,
@@ -22,6 +23,7 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
+from busplan.forms.numbers import known_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import (
     Models,
@@ -254,7 +256,9 @@ def _deadline_sentence(answer: LatencyAnswer) -> Iterator[Sentence]:
     why = f"; not shown: {'; '.join(not_shown)}" if not_shown else ""
     if not_shown and not is_broken:
         is_kept, state = "NOT SHOWN that every message keeps its deadline", "warns"
-    time = "has no worst-case response time" if us is None else f"takes up to {us:g} us of {deadline_us:g}"
+    time = "has no worst-case response time"
+    if us is not None and deadline_us is not None:
+        time = f"takes up to {known_text(us, None)} us of {known_text(deadline_us, None)}"
     yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}{why}.",), state)
 
 
@@ -266,7 +270,7 @@ def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:
     return inf if us is None else us / deadline_us
 
 
-def _tables(answer: LatencyAnswer) -> Iterator[Table]:
+def _tables(answer: LatencyAnswer) -> Iterator[Block]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
     register = answer.networks[0].bus.figures
     figures = [
@@ -277,23 +281,46 @@ def _tables(answer: LatencyAnswer) -> Iterator[Table]:
     if register.has_many_transactions:
         yield from _by_transaction(answer, figures, register.deadlines)
         return
-    caption = Sentence((f"Phases in us, {answer.subject}",))
+    caption, deciding = Sentence((f"Phases in us, {answer.subject}",)), answer.networks[0].bus.deciding_model
     for table in answer.tables:
         columns = [
-            FigureColumn(TableColumn(transaction.timing_model, group=_name(transaction)), transaction.phases)
+            FigureColumn(
+                TableColumn(
+                    transaction.timing_model,
+                    group=_name(transaction),
+                    is_detail=_is_beside(transaction, table, deciding),
+                ),
+                transaction.phases,
+            )
             for transaction in table
         ]
-        yield figure_table([(figure, 0) for figure in figures], columns, caption=caption, unit=False)
+        shown = set(register.latency_shown or (figure.key for figure in figures))
+        yield figure_table(
+            [(figure, 0) for figure in figures],
+            columns,
+            caption=caption,
+            unit=False,
+            hides_equations=True,
+            is_detail=lambda figure, shown=shown, table=table: (
+                figure.key not in shown  # type: ignore[misc]
+                or not any(transaction.phases[figure.key] for transaction in table)
+            ),
+        )
 
 
-_MOST_ROWS: Final = 30
+def _is_beside(transaction: Transaction, table: Sequence[Transaction], deciding: str) -> bool:
+    """Whether a transaction stands beside those of the model that decides."""
+    return transaction.timing_model != deciding and any(other.timing_model == deciding for other in table)
+
+
+_MOST_ROWS: Final = 15
 """Transactions of a table beyond which it shows so many of them."""
 
 
 def _by_transaction(
     answer: LatencyAnswer, figures: Sequence[Figure], deadlines: tuple[str, str] | None
-) -> Iterator[Table]:
-    """One row for each transaction; one table for each payload and timing model.
+) -> Iterator[Block]:
+    """One row for each transaction; one table for each payload and timing model, the deciding one in any answer.
 
     A time and its deadline come first. Of many transactions those closest to their deadlines are shown. What is 0 for
     all has no column.
@@ -302,8 +329,13 @@ def _by_transaction(
         figure for figure in figures if any(transaction.phases[figure.key] for transaction in answer.transactions)
     ]
     figures.sort(key=lambda figure: figure.key not in (deadlines or ()))
-    columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
+    columns = (
+        TableColumn("message", kind="words"),
+        *(TableColumn(figure.label, rank=_rank(figure, deadlines)) for figure in figures),
+    )
+    deciding = answer.networks[0].bus.deciding_model
     for table in answer.tables:
+        has_deciding = any(transaction.timing_model == deciding for transaction in table)
         for models, of_models in _by_models(table, figures):
             shares = [(row, _share(row, deadlines)) for row in of_models]
             least = sorted((share for _, share in shares), reverse=True)[:_MOST_ROWS][-1]
@@ -314,12 +346,15 @@ def _by_transaction(
                 )
                 for transaction, share in shares
             )
-            yield Table(
-                columns,
-                tuple(rows),
-                Sentence((f"By the {' and the '.join(models)} model in us, {answer.subject}",)),
-                heads=1,
-            )
+            caption = Sentence((f"By the {' and the '.join(models)} model in us, {answer.subject}",))
+            shown = Table(columns, tuple(rows), caption, heads=1)
+            beside = has_deciding and deciding not in models
+            yield Detail((shown,), f"the {' and the '.join(models)} model") if beside else shown
+
+
+def _rank(figure: Figure, deadlines: tuple[str, str] | None) -> int:
+    """A narrow terminal keeps the time and its deadline, and leaves out what is no time first."""
+    return 0 if figure.key in (deadlines or ()) else 1 if figure.unit == "us" else 2
 
 
 def _by_models(

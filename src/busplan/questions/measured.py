@@ -224,7 +224,9 @@ def _row(figure: RecordedFigure) -> TableRow:
     shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
     unit = _UNITS.get(figure.unit, figure.unit)
     note = ", ".join(filter(None, (figure.hidden, figure.note)))
-    return TableRow((figure.quantity, unit, *shown, _WITHIN[figure.verdict], ShownValue(figure.events, "events"), note))
+    cells = (figure.quantity, unit, *shown, _WITHIN[figure.verdict], ShownValue(figure.events, "events"), note)
+    is_as_planned = figure.verdict == "within" and figure.recorded == figure.planned and not figure.uncertainty
+    return TableRow(cells, is_detail=is_as_planned)
 
 
 def _value(figure: RecordedFigure, name: str) -> ShownValue:

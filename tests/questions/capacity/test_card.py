@@ -11,9 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses import kind_named
-from busplan.forms.blocks import Card, Gauge
-from busplan.forms.numbers import sentence_text
+from busplan.buses import kind_called, kind_named, variant_called
+from busplan.cli.options import time_us
+from busplan.forms import terminal
+from busplan.forms.blocks import Card, Command, Gauge
+from busplan.forms.numbers import known_text, sentence_text
+from busplan.profile.document import decode, validate
+from busplan.profile.sources import shipped_names
+from busplan.profile.starter import Machine, machine_text, shared_out
 
 SHIPPED = ("paper-4ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8")
 
@@ -22,9 +27,13 @@ def changed(profile: busplan.Profile, changes: dict[str, Any]) -> Any:
     return busplan.load_profile(profile, changes=changes)
 
 
+def card_block(answer: busplan.CapacityAnswer) -> Card:
+    return next(block for block in answer.report().blocks if isinstance(block, Card))
+
+
 def card_of(answer: busplan.CapacityAnswer) -> tuple[str, dict[str, str]]:
     """The verdict and the lines of the first card."""
-    card = next(block for block in answer.report().blocks if isinstance(block, Card))
+    card = card_block(answer)
     return card.verdict.text, {label: sentence_text(words) for label, words in card.lines}
 
 
@@ -32,7 +41,7 @@ def test_every_kind_says_how_full_how_fast_and_how_many_more() -> None:
     for name in SHIPPED:
         verdict, lines = card_of(busplan.capacity(name))
         assert verdict == "FITS"
-        assert {"used", "free", "fastest period", "room for", "largest part", "checked against"} <= {*lines}
+        assert {"used", "free", "fastest period", "room for", "largest part", "never measured"} <= {*lines}
         assert not re.search("slice|squared|JCGM|alpha", " ".join(lines.values()))
 
 
@@ -43,11 +52,13 @@ def test_used_and_free_are_the_figures_of_the_verdict() -> None:
         (895.144, 40.195, 106), abs=1e-3
     )
     _, lines = card_of(answer)
-    assert lines["used"] == "105 us of 1000, 10 %, 0.565 of it bias of the model"
+    assert lines["used"] == "105 us of 1000, 10 %"
     assert lines["free"] == "895 us, +/- 40; 100 must stay free"
     # 209.79 us + 44.76 us before SYNC0 at half of the period: 509.1 us, and up.
-    assert lines["fastest period"] == "510 us as set, limited by sync0; 290 us with bus.sync_shift = 0.9"
-    assert lines["room for"] == "98 more nodes: " + lines["room for"].partition(": ")[2]
+    assert lines["fastest period"] == (
+        "510 us, limited by SYNC0, before which commands must arrive; 290 us with bus.sync_shift = 0.9"
+    )
+    assert lines["room for"].startswith("98 more nodes: ")
     assert lines["assumed"] == "bus.master_us: measure it first"
 
 
@@ -72,7 +83,7 @@ def fastest(answer: busplan.CapacityAnswer) -> tuple[float, float] | None:
     said = card_of(answer)[1]["fastest period"]
     matched = re.match(r"([\d.e+]+) (us|ms|s)\b", said)
     if matched is None:
-        assert said.startswith(("none: ", "none as set; "))
+        assert said.startswith(("none: ", "none; "))
         longest_us = max(kind_named(answer.profile.bus.kind).periods.us, default=1e6)
         assert verdict(answer.profile, cycle__period_us=longest_us) != "fits"
         return None
@@ -224,32 +235,57 @@ def test_the_parts_of_a_bar_fill_it(used: float, doubt: float, most: float, rese
     assert parts[0].end == min(1.0, used)
 
 
-def test_a_low_terminal_shows_the_card_alone_unless_all_was_asked_for(
-    on_terminal: Callable[..., tuple[int, str]], tmp_path: Path
-) -> None:
-    def shown(*more: str, lines: int) -> list[str]:
-        size = {"COLUMNS": "80", "LINES": str(lines)}
-        code, text = on_terminal("capacity", "gantry-24", *more, cwd=tmp_path, env=size)
-        assert code == 0
-        return re.sub(r"\x1b\[[\d;]*m", "", text).splitlines()
+MOST_LINES = 22
+"""Lines of a card in a terminal of 80 columns, what to ask next among them."""
+STARTERS = ("firewire", "can", "can-fd", "ethercat", "sercos3", "sercos2", "profibus", "dynamixel", "modbus")
 
-    low = shown(lines=24)
-    assert len(low) < 24
-    assert max(map(len, low)) <= 80
-    assert "FITS" in low[0]
-    assert low[-1] == "--all shows the figures behind it."
-    for figures in (shown(lines=90), shown("--all", lines=24)):
-        assert any(line.startswith("corrected margin") for line in figures)
+
+@pytest.mark.parametrize("columns", [80, None])
+def test_capacity_is_a_card_of_few_lines_for_every_shipped_profile_and_starter(columns: int | None) -> None:
+    profiles: dict[str, busplan.Profile | str] = {name: name for name in shipped_names()}
+    for bus in STARTERS:
+        kind, groups = kind_called(bus), shared_out(16, nodes=4)
+        starter = kind_named(kind).starter
+        machine = Machine(groups, time_us(starter.period, option=""), 8, starter.host or None)
+        machine = machine._replace(variant=variant_called(bus))
+        profiles[bus] = validate(decode(machine_text(machine, kind=kind, name=bus, file="x").encode(), name=bus))
+    for name, profile in profiles.items():
+        report = busplan.capacity(profile).report()
+        commands = tuple(Command(f"busplan {name} --set {number}") for number in range(3))
+        text = terminal.text(report._replace(next_commands=commands, whole_by="--all shows all."), width=columns)
+        assert len(text.splitlines()) <= MOST_LINES, text
+        assert not re.search(r"\n\n|bias|variance|as set|sync0\b|may hide|longer bits|checked against", text), text
+        assert max(map(len, text.splitlines())) <= (columns or 1000)
+
+
+@pytest.mark.parametrize(
+    ("us", "doubt_us", "said"), [(6764.2, 424.0, "6760"), (461.4, 56.8, "461"), (73.31, 0.42, "73.3")]
+)
+def test_a_figure_has_no_more_digits_than_its_uncertainty_allows(us: float, doubt_us: float, said: str) -> None:
+    assert known_text(us, doubt_us) == said
+    assert "e" not in known_text(us * 1e9, doubt_us * 1e9)
+    assert known_text(370.4, 370.4) == "370"
+
+
+def test_all_adds_the_figures_in_a_terminal_and_in_a_pipe(
+    on_terminal: Callable[..., tuple[int, str]], run: Callable[..., Any], tmp_path: Path
+) -> None:
+    code, alone = on_terminal("capacity", "gantry-24", cwd=tmp_path, env={"COLUMNS": "80", "LINES": "90"})
+    assert (code, "corrected margin" in alone) == (0, False)
+    assert "corrected margin" not in run("capacity", "gantry-24").stdout
+    assert "\ncorrected margin" in run("capacity", "gantry-24", "--all").stdout
 
 
 def test_every_form_has_the_lines_of_the_card() -> None:
     answer = busplan.capacity("paper-4ms", period_us=500)
     (verdict,) = answer.to_dict()["verdicts"]
     _, lines = card_of(answer)
-    assert {line["label"]: line["text"] for line in verdict["lines"]} == lines
+    details = {label: sentence_text(words) for label, words in card_block(answer).details}
+    assert {"correction", "checked against"} <= {*details}
+    assert {line["label"]: line["text"] for line in verdict["lines"]} == {**lines, **details}
     assert lines["short by"] == "20 us, +/- 6"
     assert all(f"{label}: {words}" in verdict["text"] for label, words in lines.items())
-    assert all(f"  {label.ljust(15)} {words}\n" in str(answer) for label, words in lines.items())
+    assert all(f"  {label.ljust(15)} {words}\n" in f"{answer}\n" for label, words in lines.items())
     assert '<p class="answer">DOES NOT FIT</p>' in answer.html
     assert '<rect class="used fails" x="0.000%" y="0" width="' in answer.html
     assert "| short by | 20 us, +/- 6 |" in busplan.forms.render(answer.report(), "markdown")

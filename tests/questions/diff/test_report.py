@@ -24,7 +24,7 @@ def changed(a: busplan.Profile, changes: dict[str, object], **options: Any) -> b
 
 
 def text(a: busplan.Profile, changes: dict[str, object]) -> list[str]:
-    return render(changed(a, changes).report(), "table").splitlines()
+    return render(changed(a, changes).report()._replace(is_whole=True), "table").splitlines()
 
 
 # --- the sentence -----------------------------------------------------------------------------------------

@@ -439,7 +439,7 @@ class CanCycle(BusCycle):
             return doubts
         late_us = (self._of(self.traffic.longest).required_us - self.required_us) / 2
         key = "bus.clock_tolerance" if bus.clock_tolerance else "fd_late_bits"
-        return *doubts, Doubt(key, "longer bits and FD frames", late_us)
+        return *doubts, Doubt(key, "clocks that are not exact, and long FD frames", late_us)
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -509,8 +509,8 @@ class CanCycle(BusCycle):
             lines.append(("latest message", f"{latest.name}, {words}"))
         possible_us = plain(self.possible_us())
         if possible_us:
-            why = "its frames may hide this" if self.traffic.access == "burst" else "the test of queues is sufficient"
-            lines.append(("upper bound", f"up to {_short(possible_us)} us less may do: {why}"))
+            why = "frames of a burst wait" if self.traffic.access == "burst" else "messages in queues wait"
+            lines.append(("upper bound", f"{why} up to {_short(possible_us)} us; they may wait less"))
         tried = range(int(c.MOST_REPEATED) + 1)
         most = bisect_left(tried, 1, key=lambda number: not fits(self._with_burst(number))) - 1
         if most >= 0:

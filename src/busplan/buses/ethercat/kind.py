@@ -79,7 +79,7 @@ SYNC0: Final = share_of_period(
     doubt=_late_command_doubt_us,
     perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
     way_out="a larger bus.sync_shift moves SYNC0 later",
-)
+)._replace(label="SYNC0, before which commands must arrive")
 """A command must be in every device before SYNC0."""
 
 

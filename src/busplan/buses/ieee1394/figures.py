@@ -190,5 +190,9 @@ FIGURES: Final = BusFigures(
     compared=tuple(chain(*zip(_LATENCIES, _LATENCIES_WITH_GAPS, _TRANSACTIONS, strict=True))),
     planned=(GAP_COUNT.key, GAP_COUNT_SAFE.key),
     latency_rows=_PHASES,
+    latency_shown=(
+        *("query_us", "boards_us", "hub_wait_us", "request_and_acknowledge_us", "hold_us", "execution_us"),
+        *("response_and_acknowledge_us", "latency_us", "gaps_us", "worst_extra_us", "host_us", "transaction_us"),
+    ),
     latency_document=LATENCY,
 )

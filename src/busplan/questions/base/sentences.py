@@ -1,7 +1,6 @@
 """Sentences and documents that several questions share."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION, Figure
@@ -25,6 +24,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
+from busplan.forms.numbers import known_decimals, known_text
 from busplan.profile.changes import KeyChanges
 from busplan.profile.edit import value_text
 from busplan.questions.fit.certainty import TIME
@@ -105,6 +105,12 @@ def checked_against(data: Sequence[str], *, has_cycle: bool = True) -> str:
     return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
+def never_measured(data: Sequence[str]) -> str:
+    """Parts of a bus model that no figure of the data files tests; without any figure, the whole cycle."""
+    tested = parts_tested(data)
+    return ", ".join(tested.untested) or ("" if tested.parts else "a whole cycle; no figure is published")
+
+
 def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
     """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
     if after is not None:
@@ -126,10 +132,13 @@ def margin_words(figures: FitFigures, network: Network) -> tuple[Part, ...]:
     return joined(*reasons, by=", and ").parts
 
 
-def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
-    """The corrected margin under the model that decides, with its uncertainty if that is known."""
-    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
-    return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
+def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[Part, ...]:
+    """The corrected margin under the model that decides, with its uncertainty if that is known, in its digits."""
+    margin_us, doubt_us = figures.margin_corrected_us, figures.uncertainty_us
+    shown = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
+    decimals = known_decimals(margin_us or 0.0, doubt_us)
+    margin, doubt = (value._replace(decimals=decimals, unit=value.unit if unit else "") for value in shown)
+    return (margin,) if doubt_us is None else (margin, " +/- ", doubt)
 
 
 def time_lines(figures: FitFigures, network: Network) -> Iterator[tuple[str, Sentence]]:
@@ -139,46 +148,20 @@ def time_lines(figures: FitFigures, network: Network) -> Iterator[tuple[str, Sen
         figures.uncertainty_us,
         figures.margin_corrected_us or 0.0,
     )
-    used, whole = used_us(figures), time_text(given_us, None)
+    used, whole = used_us(figures), known_text(given_us, None)
     whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
-    bias = f", {time_text(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
-    words = f"{time_text(used, uncertainty_us)} us of {whole}, {percent_text(used / given_us)}{bias}"
+    words = f"{known_text(used, uncertainty_us)} us of {whole}, {100 * used / given_us:.0f} %"
     yield "used", Sentence((words,))
-    doubt = "" if uncertainty_us is None else f", +/- {time_text(uncertainty_us, uncertainty_us)}"
+    doubt = "" if uncertainty_us is None else f", +/- {known_text(uncertainty_us, uncertainty_us)}"
     reserve_us = given_us * network.profile.limits.reserve
-    reserve = f"; {time_text(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
-    free = f"{time_text(abs(margin_us), uncertainty_us)} us{doubt}"
+    reserve = f"; {known_text(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
+    free = f"{known_text(abs(margin_us), uncertainty_us)} us{doubt}"
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{free}{reserve}",))
 
 
 def used_us(figures: FitFigures) -> float:
     """Time that a cycle takes, with the bias of the model [us]."""
     return figures.available_us - (figures.margin_corrected_us or 0.0)
-
-
-_DIGITS: Final = 3
-"""Significant digits of a time whose uncertainty is unknown."""
-_MOST_DECIMALS: Final = 6
-"""Most decimals of a time in us: below a picosecond there is only float rounding."""
-
-
-def percent_text(share: float) -> str:
-    """A share as a percentage without decimals."""
-    return f"{share:.0%}".replace("%", " %")
-
-
-def time_text(us: float, uncertainty_us: float | None) -> str:
-    """A time with as many digits as its uncertainty allows."""
-    return f"{us:.{time_decimals(us, uncertainty_us)}f}"
-
-
-def time_decimals(us: float, uncertainty_us: float | None) -> int:
-    """Decimals down to the first digit of the uncertainty; without one, for `_DIGITS` significant digits."""
-    if uncertainty_us and isfinite(uncertainty_us):
-        decimals = -floor(log10(uncertainty_us))
-    else:
-        decimals = _DIGITS - 1 - floor(log10(abs(us))) if us else 0
-    return min(max(0, decimals), _MOST_DECIMALS)
 
 
 def safety_record(figures: FitFigures, network: Network) -> Record:

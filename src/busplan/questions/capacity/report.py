@@ -10,6 +10,7 @@ from busplan.english import nouns
 from busplan.forms.blocks import (
     Block,
     Code,
+    Detail,
     Record,
     Report,
     Sentence,
@@ -44,7 +45,6 @@ def capacity_report(answer: CapacityAnswer) -> Report:
         tuple(_blocks(answer)),
         document("capacity", profile=name, results=results, verdicts=list(map(_verdict, answer.verdicts))),
         with_profile(name, records),
-        is_card_enough=True,
     )
 
 
@@ -52,11 +52,8 @@ def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(answer.verdicts, start=1):
         yield card(verdict, is_brief=number < len(answer.verdicts))
-    if answer.verdicts[-1].rests_on:
-        yield _rests_on_table(answer.verdicts[-1])
-    yield _table(answer)
-    if answer.profile.group:
-        yield _groups_table(answer)
+    rests_on = [_rests_on_table(answer.verdicts[-1])] if answer.verdicts[-1].rests_on else []
+    yield Detail((*rests_on, _table(answer), *([_groups_table(answer)] if answer.profile.group else [])))
 
 
 _GROUP_BY_DECIDING: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
@@ -65,12 +62,10 @@ _GROUP_BY_OTHER: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_B
 """Figures of a group by another timing model."""
 _CERTAINTY: Final = (figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS)
 _VERDICT: Final = (figure.VERDICT, figure.FITS, *_CERTAINTY, *_GROUP_BY_DECIDING)
-_ALWAYS_SHOWN: Final = frozenset(row.key for row in (*_VERDICT, figure.AVAILABLE, figure.REQUIRED, figure.MARGIN))
-"""Keys of the figures that are always shown, as are the terms that take time; all others are details."""
 
 
 def _table(answer: CapacityAnswer) -> Table:
-    """Figures of all periods, the timing models side by side; figures that do not decide are details."""
+    """Figures of all periods, the timing models side by side."""
     network = answer.verdicts[0].network
     profile, bus = network.profile, network.bus
     setup = ", ".join(bus.setup_words(network))
@@ -80,17 +75,13 @@ def _table(answer: CapacityAnswer) -> Table:
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
     rows = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)]
-    shown = _ALWAYS_SHOWN | {term.key for figures in answer.results for term in figures.terms if term.us}
     if not profile.has_cycle:
         results = [figures.values() for figures in answer.results]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
-        shown |= {figure.key for figure in bus.figures.table}
     return figure_table(
         rows,
         list(_columns(answer)),
         caption=caption,
-        hides_equations=True,
-        is_detail=lambda figure: figure.key not in shown,
         state=_state,
     )
 
@@ -174,7 +165,7 @@ def _change_record(change: Change) -> Record:
 def _verdict(verdict: Verdict) -> Record:
     change, figures, bus = verdict.change, verdict.deciding, verdict.network.bus
     missing = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
-    summary = card(verdict)
+    summary = card(verdict).whole
     lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
     return {

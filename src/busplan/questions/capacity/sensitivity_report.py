@@ -6,11 +6,13 @@ from typing import Final
 
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
 from busplan.buses.network import Network
+from busplan.elementwise import plain
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
+    Detail,
     Record,
     Report,
     Sentence,
@@ -24,8 +26,8 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
-from busplan.forms.numbers import decimals_of, period_value, sentence_text
-from busplan.questions.base.sentences import fields, with_profile
+from busplan.forms.numbers import decimals_of, known_decimals, period_value, sentence_text
+from busplan.questions.base.sentences import fields, margin_parts, with_profile
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.report import capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Reach, Sensitivity
@@ -59,7 +61,6 @@ def sensitivity_report(answer: CapacityAnswer) -> Report:
         blocks=(*report.blocks, *chain.from_iterable(map(_blocks, sensitivities))),
         document={**report.document, "verdicts": verdicts},
         records=with_profile(answer.profile.name, rows),
-        is_card_enough=False,
     )
 
 
@@ -113,7 +114,8 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
         sides = "a bar to the left takes from it, one to the right adds to it"
         yield Chart(drawn, Sentence((f"{change} moves the margin most; {sides}, in us",)))
     yield _headline(sensitivity)
-    yield from (Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note)
+    if notes := tuple(Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note):
+        yield Detail(notes, "why some changes do nothing here")
     yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.network)
     if sensitivity.reaches:
         yield _reaches_table(sensitivity.reaches)
@@ -123,7 +125,7 @@ def _table(sensitivity: Sensitivity) -> Table:
     """Every change with what it does to the margin, the largest effect first."""
     caption = sentence(
         f"What moves the margin of {{}} at {{}}, by the {sensitivity.timing_model} model",
-        figure_value(MARGIN_CORRECTED, sensitivity.now.margin_corrected_us),
+        margin_parts(sensitivity.now)[0],
         period_value(sensitivity.network.profile.cycle.period_us),
     )
     columns = (
@@ -138,14 +140,31 @@ def _table(sensitivity: Sensitivity) -> Table:
             (
                 effect.change,
                 _step(effect),
-                ShownValue(effect.margin_change_us, "margin_change_us", "us", _DECIMALS, signed=True),
-                figure_value(MARGIN_CORRECTED, effect.then and effect.then.margin_corrected_us),
+                _change_value(effect, sensitivity),
+                _then_value(effect),
                 _verdict(effect.then, sensitivity.network),
-            )
+            ),
+            is_detail=bool(effect.note),
         )
         for effect in sensitivity.effects
     )
     return Table(columns, tuple(rows), caption)
+
+
+def _change_value(effect: Effect, sensitivity: Sensitivity) -> ShownValue:
+    """What a change takes from the margin, in the digits that the margin has."""
+    change_us, now = effect.margin_change_us, sensitivity.now
+    decimals = min(_DECIMALS, max(0, known_decimals(change_us or 0.0, now.uncertainty_us)))
+    return ShownValue(change_us, "margin_change_us", "us", decimals, signed=True)
+
+
+def _then_value(effect: Effect) -> ShownValue:
+    """The margin after a change, in the digits that its uncertainty allows."""
+    margin_us, uncertainty_us = None, None
+    if effect.then is not None:
+        margin_us, uncertainty_us = effect.then.margin_corrected_us, effect.then.uncertainty_us
+    decimals = known_decimals(margin_us or 0.0, uncertainty_us)
+    return figure_value(MARGIN_CORRECTED, margin_us)._replace(decimals=min(_DECIMALS, max(0, decimals)))
 
 
 def _reaches_table(reaches: Sequence[Reach]) -> Table:
@@ -224,8 +243,8 @@ def _headline(sensitivity: Sensitivity) -> Sentence:
         return Sentence(("None of these changes moves the margin.",))
     most = sentence(
         f"{_capital(first.change)} moves the margin most, by {{}} to {{}}.",
-        ShownValue(first.margin_change_us, "margin_change_us", "us", _DECIMALS, signed=True),
-        figure_value(MARGIN_CORRECTED, first.then and first.then.margin_corrected_us),
+        _change_value(first, sensitivity),
+        _then_value(first),
     )
     return joined(most, *_after_each(sensitivity))
 
@@ -250,10 +269,11 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, network: Network) -> Senten
     now, next_term = bottleneck.binding_term, bottleneck.next_binding_term
     labels = by_key(network.bus.figures.terms)
     label, next_label = labels[now.key].label, labels[next_term.key].label
-    us = ShownValue(now.us, "binding_term_us", "us", _DECIMALS)
-    next_us = ShownValue(next_term.us, "next_binding_term_us", "us", _DECIMALS)
+    us = ShownValue(now.us, "binding_term_us", "us", known_decimals(plain(now.us), None))
+    next_us = ShownValue(next_term.us, "next_binding_term_us", "us", known_decimals(plain(next_term.us), None))
     if bottleneck.next_margin_corrected_us is not None:
-        margin = ShownValue(bottleneck.next_margin_corrected_us, "next_margin_corrected_us", "us", _DECIMALS)
+        margin_us = bottleneck.next_margin_corrected_us
+        margin = ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))
         text = (
             f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, and the margin {{}}"
         )

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, sqrt
 from typing import Final
 
 from busplan.buses.cycle import RestsOn
@@ -12,16 +12,14 @@ from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
-from busplan.forms.numbers import period
+from busplan.forms.numbers import known_decimals, known_text, period
 from busplan.profile.edit import short_text
 from busplan.questions.base.sentences import (
     change_meanings,
     checked_against,
-    percent_text,
+    never_measured,
     settings_sentence,
-    time_decimals,
     time_lines,
-    time_text,
     used_us,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
@@ -193,7 +191,8 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
     if not is_brief:
         lines += _basis(verdict)
     lines += _caveats(verdict)
-    return Card(subject, _word(verdict), _gauge(verdict), tuple(lines))
+    details = () if is_brief else tuple(_details(verdict))
+    return Card(subject, _word(verdict), _gauge(verdict), tuple(lines), details)
 
 
 def _word(verdict: Verdict) -> Words:
@@ -249,16 +248,16 @@ def _fastest(verdict: Verdict) -> Sentence:
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
         none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
-        return Sentence((f"none as set{with_best}" if best else none,), "fails")
-    limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
-    as_set = " as set" if best else ""
-    return Sentence((f"{_rounded_up(verdict, fastest.us)}{as_set}{limited}{with_best}",))
+        return Sentence((f"none{with_best}" if best else none,), "fails")
+    limit = verdict.network.bus.limit(fastest.need.key)
+    limited = "" if fastest.need.key == TIME else f", limited by {(limit and limit.label) or fastest.need.key}"
+    return Sentence((f"{_rounded_up(verdict, fastest.us)}{limited}{with_best}",))
 
 
 def _rounded_up(verdict: Verdict, us: float) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not verdict.network.bus.periods.us:
-        scale = 10.0 ** time_decimals(us, verdict.deciding.uncertainty_us)
+        scale = 10.0 ** known_decimals(us, verdict.deciding.uncertainty_us)
         us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
     return period(us)
 
@@ -283,7 +282,7 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
     meanings = change_meanings(verdict.network.bus)
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     left_us = change.figures.margin_corrected_us
-    left = "" if left_us is None else f", which leaves {time_text(left_us, change.figures.uncertainty_us)} us"
+    left = "" if left_us is None else f", which leaves {known_text(left_us, change.figures.uncertainty_us)} us"
     yield label, joined(settings, Sentence((left,)), by="")
 
 
@@ -331,25 +330,37 @@ def _buses(figures: CapacityFigures) -> Iterator[_Line]:
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:
-    """The largest part, and what the verdict assumes, leaves out, and was checked against."""
+    """The largest part and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
     figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
     if figures.terms:
         largest = max(figures.terms, key=lambda term: plain(term.us))
-        us = time_text(plain(largest.us), figures.uncertainty_us)
+        us = known_text(plain(largest.us), figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, {percent_text(parts[0]['share'])} of the variance",))
-    if network.groups and figures.bias_us is None:
-        (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
-        uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
-        yield "bias", Sentence((f"none corrected{uncertainty}: {error}",))
+        part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, +/- {known_text(part_us, figures.uncertainty_us)} us",))
+    if network.groups and figures.uncertainty_us is None:
+        yield "doubt", Sentence(("not known",), "warns")
     for assumption in verdict.assumptions:
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
     if verdict.rests_on:
         yield "rests on", Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
-    yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=bool(network.groups)),))
+    if network.groups and (never := never_measured(bus.evidence_for(network))):
+        yield "never measured", Sentence((never,))
+
+
+def _details(verdict: Verdict) -> Iterator[_Line]:
+    """What the answer needs only when somebody asks: the correction, the published figures, other models."""
+    figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
+    if figures.bias_us:
+        words = "in what is used: measured buses take so much longer than the timing model"
+        yield "correction", Sentence((f"{known_text(figures.bias_us, None)} us {words}",))
+    elif network.groups and figures.bias_us is None:
+        (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
+        yield "correction", Sentence((f"none: {error}",))
+    yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=False),))
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
@@ -360,9 +371,9 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
     deciding = verdict.deciding
     for other in verdict.others:
         if contradicts(other.fits, deciding):
-            needed_us = time_text(other.required_us, deciding.uncertainty_us)
+            needed_us = known_text(other.required_us, deciding.uncertainty_us)
             words = (
-                f"says otherwise, {needed_us} us needed of {time_text(other.available_us, None)}, but does not decide"
+                f"says otherwise, {needed_us} us needed of {known_text(other.available_us, None)}, but does not decide"
             )
             yield f"{other.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:

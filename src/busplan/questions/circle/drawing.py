@@ -226,7 +226,8 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
     rings.append((1.0, Entry("nominal", "nominal circle", shape="line")))
     if scale.tolerance_mm is not None:
         rings += [(scale.radius(error), TOLERANCE) for error in (-scale.tolerance_mm, scale.tolerance_mm)]
-    return Dial(Entry("first"), low, high, tuple(rings), (scale.ring_text, "a ring"), direction == "cw")
+    path = Entry("first", "path, its error magnified", shape="line")
+    return Dial(path, low, high, tuple(rings), (scale.ring_text, "a ring"), direction == "cw")
 
 
 Floats = NDArray[np.float64]

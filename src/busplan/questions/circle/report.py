@@ -173,7 +173,8 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
         yield from _circle_sentences(test.profile, result)
     simulated = (result for result in test.results if result.stable is not None)
     yield from _servo_sentence(test.profile, next(simulated, test.results[0]))
-    yield _circle_table(test.results)
+    if any(test.runs):
+        yield _circle_table([result for result, run in zip(test.results, test.runs, strict=True) if run is not None])
     yield from _falling(test)
     if test.with_contributions:
         ranked = [result for result in test.results if result.contributions is not None]

@@ -14,6 +14,7 @@ from busplan.forms.blocks import (
     Cell,
     Chart,
     Code,
+    Detail,
     Record,
     Report,
     Sentence,
@@ -36,6 +37,7 @@ from busplan.questions.base.sentences import (
     document,
     execution_sentence,
     fields,
+    margin_parts,
     parts_by,
     reset_sentence,
     with_profile,
@@ -52,12 +54,11 @@ _COLUMNS: Final = (
     TableColumn("bus", kind="words", wraps=True),
     TableColumn("smallest period", "us"),
     TableColumn("most", group="safe axes"),
-    TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
+    TableColumn("limited by", kind="words", group="safe axes", rank=3, wraps=True),
     TableColumn(VERDICT.label, kind="words", wraps=True),
     TableColumn("margin", "us"),
-    TableColumn("U", "us"),
-    TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True),
-    TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True),
+    TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
+    TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True, is_detail=True),
 )
 _ASSUMED: Final = (
     TableColumn("bus", kind="words"),
@@ -104,22 +105,22 @@ def _blocks(answer: CompareAnswer) -> Iterator[Block]:
     yield Table(_COLUMNS, tuple(map(_row, answer.kinds)), Sentence(("The machine on each kind of bus",)))
     if answer.compared:
         yield Chart(_drawing(answer, title=sentence_text(summary)), Sentence((_CAPTION,)))
-    yield from (_note(machine, answer.network) for machine in answer.kinds)
-    yield from _left_out(answer)
+    yield from filter(None, (_hindrance(machine) for machine in answer.kinds))
+    notes = (*(_note(machine, answer.network) for machine in answer.compared), *_left_out(answer))
+    yield Detail(notes, "what each kind leaves out, assumes and was checked against")
     yield from execution_sentence(answer.network)
     assumed = [(machine, assumption) for machine in answer.compared for assumption in machine.assumed]
     if assumed:
         rows = (
             TableRow(
                 (machine.title, Code(assumption.key), short_text(assumption.value), assumption.source),
-                is_detail=assumption.source == "default",
             )
             for machine, assumption in assumed
         )
         caption = (
             "Assumed, by the profile, as a new profile of the kind has it or by default, until somebody knows better"
         )
-        yield Table(_ASSUMED, tuple(rows), Sentence((caption,)))
+        yield Detail((Table(_ASSUMED, tuple(rows), Sentence((caption,))),))
 
 
 def _headline(answer: CompareAnswer) -> Sentence:
@@ -184,19 +185,18 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
         ShownValue(machine.safe.axes, SAFE_AXES.key),
         machine.safe.limited_by,
         Words(f"{figures.verdict}{unsafe}", state_of(machine.fits)),
-        *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
+        Sentence(margin_parts(figures, unit=False)),
         machine.bus.figures.term_label(figures.binding_term),
         ", ".join(filter(None, (_values(new), count))) or "-",
     )
     return TableRow(cells)
 
 
-def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
-    """Say of a kind what stands in the way, what execution times mean on it, and what it is checked against."""
+def _hindrance(machine: MachineOnKind | NotOnKind) -> Sentence | None:
+    """Say of a kind what stands in the way; None where nothing does."""
     if isinstance(machine, NotOnKind):
         return Sentence((f"{machine.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
-    figures, bus = machine.figures, machine.bus
-    sentences = []
+    figures, sentences = machine.figures, list[Sentence]()
     broken = [limit.words(machine.network) for limit in limits_behind(figures, machine.network)]
     if broken:
         sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(broken)}.",)))
@@ -206,12 +206,18 @@ def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
     if machine.smallest.us is None:
         sentences.append(Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",)))
     sentences += reset_sentence(machine.after_reset, machine.network)
+    return joined(Sentence((f"{machine.title}:",)), *sentences) if sentences else None
+
+
+def _note(machine: MachineOnKind, network: Network) -> Sentence:
+    """Say of a kind what execution times mean on it, and what it is checked against."""
+    sentences = []
     if execution := _execution(machine, network):
         sentences.append(Sentence((execution,)))
     if machine.best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in machine.best.changes.items())
         sentences.append(Sentence((f"The smallest period is with {values}, which is free to change.",)))
-    sentences.append(Sentence((f"Checked against {checked_against(bus.evidence_for(machine.network))}.",)))
+    sentences.append(Sentence((f"Checked against {checked_against(machine.bus.evidence_for(machine.network))}.",)))
     return joined(Sentence((f"{machine.title}:",)), *sentences)
 
 

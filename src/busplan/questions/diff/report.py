@@ -52,7 +52,7 @@ _STATES: Final[dict[Judgement, State]] = {
 """State of a judgement on B."""
 _MOST_NAMED: Final = 4
 """Most figures that the sentence names."""
-_MOST_KEYS: Final = 20
+_MOST_KEYS: Final = 12
 """Most keys shown to a reader without --all; JSON lists all."""
 _ALL_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
@@ -153,7 +153,7 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
         rows = (
             TableRow(
                 (Code(key.key), _cell(key.key, key.a, key.b), _cell(key.key, key.b, key.a)),
-                is_detail=number >= _MOST_KEYS,
+                is_detail=number >= _MOST_KEYS or {key.a and key.a.source, key.b and key.b.source} == {None, "default"},
             )
             for number, key in enumerate(answer.keys)
         )
@@ -166,7 +166,10 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
         or (figure.judgement == "neutral" and None not in (figure.a, figure.b))
     ]
     if differ:
-        yield Table(_FIGURES, tuple(map(_row, differ)), heads=3)
+        deciding = {"plan", *(side.network.bus.deciding_model for side in (answer.a, answer.b))}
+        first = [figure for figure in differ if figure.judgement != "neutral" and figure.part in deciding] or differ
+        rows = (_row(figure)._replace(is_detail=figure not in first) for figure in differ)
+        yield Table(_FIGURES, tuple(rows), heads=3)
 
 
 def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> Cell:

@@ -8,6 +8,7 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Chapter,
+    Detail,
     JsonDocument,
     Record,
     Report,
@@ -84,8 +85,37 @@ def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
         if not paper:
             bus = kind_named(kind.kind)
             yield Sentence((f"{bus.title} (kind {bus.kind}): checked against {checked_against(bus.evidence_data)}.",))
-        for section in kind.sections:
-            yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
+        chapters = tuple(
+            Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
+            for section in kind.sections
+        )
+        if chapters:
+            yield Detail(chapters, "each figure", () if len(kinds) > 1 else (_summary(kind),))
+
+
+def _summary(kind: KindEvidence) -> Table:
+    """How far the computed figures of each section are from the published ones, by method."""
+    rows = []
+    for section in kind.sections:
+        by_method: dict[str, list[Comparison]] = {}
+        for comparison in section.comparisons:
+            by_method.setdefault(comparison.method, []).append(comparison)
+        for number, (method, of_method) in enumerate(by_method.items()):
+            shares = [one.relative_residual for one in of_method if one.relative_residual is not None]
+            ends = (
+                ShownValue(end, "relative_residual", "%", 1, signed=True, fixed=True)
+                for end in ((min(shares), max(shares)) if shares else (None, None))
+            )
+            title = section.title if number == 0 else ""
+            rows.append(TableRow((title, method, ShownValue(len(of_method), "figures"), *ends)))
+    columns = (
+        TableColumn("published", kind="words", wraps=True),
+        TableColumn("computed by", kind="words", wraps=True),
+        TableColumn("figures"),
+        TableColumn("least", "%", group="residual"),
+        TableColumn("most", "%", group="residual"),
+    )
+    return Table(columns, tuple(rows), Sentence(("How far computed figures are from published ones",)))
 
 
 def _table(comparisons: Sequence[Comparison]) -> Table:

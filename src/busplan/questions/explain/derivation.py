@@ -26,7 +26,7 @@ from busplan.sourced import Input, Sourced, short
 CommandName = Literal["capacity", "latency"]
 _Numbers = Mapping[str, Traced]
 
-_GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
+GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """Grades from the weakest to the strongest; "given" values are choices, not knowledge."""
 _MOST_HINTS: Final = 3
 _BESIDE: Final = MappingProxyType({MARGIN_CORRECTED.key: (UNCERTAINTY,)})
@@ -72,7 +72,7 @@ class Derivation:
     @property
     def weakest_grade(self) -> str:
         """Grade of the least well known input."""
-        return min((given.grade for given in self.inputs), key=_GRADES.index, default=_GRADES[-1])
+        return min((given.grade for given in self.inputs), key=GRADES.index, default=GRADES[-1])
 
 
 class Wanted(NamedTuple):
@@ -347,8 +347,8 @@ def assumptions(network: Network) -> tuple[Input, ...]:
     def rank(given: Input) -> int:
         """Place of the grade of an input; a choice comes after all of them."""
         if given.grade != "given":
-            return _GRADES.index(given.grade)
+            return GRADES.index(given.grade)
         is_time = given.name.startswith(executions) and not given.name.endswith(choosing_keys(bus))
-        return -1 if is_time and not given.source.startswith("default") else len(_GRADES)
+        return -1 if is_time and not given.source.startswith("default") else len(GRADES)
 
-    return tuple(sorted((given for given in by_name.values() if rank(given) < len(_GRADES)), key=rank))
+    return tuple(sorted((given for given in by_name.values() if rank(given) < len(GRADES)), key=rank))

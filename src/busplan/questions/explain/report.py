@@ -1,10 +1,12 @@
 """Answer of `busplan explain`: every step to a figure and its inputs; without one, assumptions and all figures."""
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
+from busplan.english import plural
 from busplan.forms.blocks import (
     Block,
     Calculation,
@@ -12,6 +14,7 @@ from busplan.forms.blocks import (
     Cell,
     Chapter,
     Code,
+    Detail,
     Record,
     Report,
     Sentence,
@@ -23,7 +26,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import figure_text, period_value
 from busplan.questions.base.sentences import document, fields, with_profile
-from busplan.questions.explain.derivation import CommandName, Derivation, Step
+from busplan.questions.explain.derivation import GRADES, CommandName, Derivation, Step
 from busplan.questions.explain.formula import formula_of
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
@@ -37,8 +40,21 @@ _INPUTS: Final = (
     TableColumn("source", kind="words", rank=4, leaves="below", wraps=True),
 )
 """Columns of an input, and of how well it is known."""
+_KNOWN: Final = tuple(
+    column._replace(is_detail=True) if column.heading == "source" else column._replace(leaves="out")
+    for column in _INPUTS
+)
+"""The same, the source only in a whole answer."""
+_MOST_INPUTS: Final = 8
+"""Inputs in an answer that is not whole."""
 _SYMBOL: Final = TableColumn("symbol", kind="words", rank=1, leaves="below")
 _MEANING: Final = TableColumn("meaning", kind="words", rank=5, leaves="below", wraps=True)
+_USED: Final = (
+    TableColumn("from", kind="words"),
+    TableColumn("value"),
+    TableColumn("unit", kind="words"),
+    TableColumn("by", kind="words"),
+)
 _FIGURES: Final = (
     *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
     TableColumn("eq", kind="words", rank=2),
@@ -51,7 +67,10 @@ def assumptions_report(
     profile: Profile, assumptions: Sequence[Input], figures: Sequence[tuple[CommandName, Figure]]
 ) -> Report:
     """Report of `explain PROFILE`: what the verdict rests on, and the figures that can be explained."""
-    inputs = (TableRow((*_input_cells(given), given.meaning)) for given in assumptions)
+    inputs = (
+        TableRow((*_input_cells(given), given.meaning), is_detail=number >= _MOST_INPUTS)
+        for number, given in enumerate(assumptions)
+    )
     rows = (
         TableRow((command, Code(figure.key), figure.reference, figure.unit, figure.meaning))
         for command, figure in figures
@@ -61,11 +80,13 @@ def assumptions_report(
         {"command": command, "figure": figure.key, **fields(figure, "symbol", "unit", "reference", "meaning")}
         for command, figure in figures
     ]
+    table = Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
+    names = dict.fromkeys(figure.key for _, figure in figures)
     return Report(
         Sentence(("The figures of ", Code(profile.name))),
         (
-            Table((*_INPUTS, _MEANING), tuple(inputs), caption, stacks=True),
-            Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True),
+            Table((*_KNOWN, _MEANING), tuple(inputs), caption, stacks=True),
+            Detail((table,), "what each figure is", (Sentence((f"Figures to explain: {', '.join(names)}.",)),)),
         ),
         document(
             "explain",
@@ -165,7 +186,33 @@ def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
     result = _result(derivation.value, figure.key, figure.unit)
     title = Sentence((Code(figure.key), " of ", Code(name), *period, f", {_of(derivation)}: ", result))
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
-    return Chapter(title, (about, Calculation(tuple(map(_step, derivation.steps))), below))
+    steps = Calculation(tuple(map(_step, derivation.steps)))
+    if len(derivation.steps) <= _MOST_STEPS and len(derivation.inputs) <= _MOST_INPUTS:
+        return Chapter(title, (about, steps, below))
+    adds = f"{plural(len(derivation.steps), 'step')} and {plural(len(derivation.inputs), 'input')}"
+    return Chapter(title, (about, Detail((steps, below), adds, tuple(_last_step(derivation)))))
+
+
+_MOST_STEPS: Final = 4
+"""Steps of a derivation that any answer shows whole."""
+
+
+def _last_step(derivation: Derivation) -> Iterator[Block]:
+    """The last step, the steps that it takes its numbers from, and the inputs that are known the least."""
+    *before, last = derivation.steps or (None,)
+    if last is not None:
+        yield Calculation((_step(last),))
+        used = [step for step in before if re.search(rf"(?<!\w){re.escape(step.symbol)}(?!\w)", last.formula)]
+        rows = (
+            TableRow((Code(step.symbol), _result(step.value, step.key, ""), step.unit, step.reference)) for step in used
+        )
+        if used:
+            yield Table(_USED, tuple(rows))
+    known = (given for given in derivation.inputs if given.grade in GRADES[:-1])
+    weak = sorted(known, key=lambda given: GRADES.index(given.grade))[:_MOST_INPUTS]
+    rows = (TableRow((Code(given.symbol), *_input_cells(given))) for given in weak)
+    caption = Sentence((f"Inputs, the least well known first; the weakest grade is {derivation.weakest_grade}",))
+    yield Table((_SYMBOL._replace(leaves="out"), *_KNOWN), tuple(rows), caption)
 
 
 def _result(value: object, key: str, unit: str) -> ShownValue | Words:
