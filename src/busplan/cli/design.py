@@ -554,6 +554,7 @@ def import_command(
     bus: str | None = None,
     channel: str | None = None,
     period: str | None = None,
+    bit_rate: float | None = None,
     force: bool = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
@@ -579,6 +580,9 @@ def import_command(
     --period TIME
         Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is not
         shown to fit. [default: such messages are left out]
+    --bit-rate RATE
+        Bit rate of a CAN bus in kbit/s, before that of any file. [default: that of a file, or that which frames of a
+        log directly after each other show]
     --force
         Let -o overwrite a file that is already there.
     """
@@ -600,6 +604,7 @@ def import_command(
                 name=None if new is None else new.stem,
                 bus=bus,
                 channel=channel,
+                bit_rate_kbit_s=bit_rate,
                 period_us=None if period is None else time_us(period, option="--period"),
                 progress=progress,
             )

@@ -12,6 +12,7 @@ from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, MOST_REPEAT
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
+    NO_DEADLINE_US,
     NOT_BY_PRIORITY,
     REPEATED,
     SYNC,
@@ -57,7 +58,7 @@ from busplan.elementwise import (
     value_of,
     within,
 )
-from busplan.english import first_of
+from busplan.english import first_of, plural
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
@@ -434,7 +435,7 @@ class CanCycle(BusCycle):
         return (*host, *slowest, *traffic)
 
     def premises(self) -> tuple[str, ...]:
-        """The order of queues, and how often an error repeats a frame."""
+        """The order of queues, messages without a deadline, and how often an error repeats a frame."""
         bus, groups = self.network.profile.bus, self.network.groups
         orders = {group.node.queue or bus.queue for group in groups} | {bus.queue}
         known = sorted(order for order in orders if order is not None)
@@ -444,11 +445,13 @@ class CanCycle(BusCycle):
             queues += f" (senders {first_of(list(senders), 8)})" if senders else ""
         if None in orders:
             queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
+        free = sum(message.deadline_us == "none" for message in self.network.profile.message)
+        deadlines = (f"no deadline of {plural(free, 'message')}",) if free else ()
         if is_off(self.traffic.error_burst):
-            return queues, "no repeated frames"
+            return (queues, *deadlines, "no repeated frames")
         burst, period_us = plain(self.traffic.error_burst), plain(self.traffic.error_period_us)
         at_once = f"{burst:g} at once, " if burst > 1 else ""
-        return queues, f"repeated frames: {at_once}1 every {period_us:g} us"
+        return (queues, *deadlines, f"repeated frames: {at_once}1 every {period_us:g} us")
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -500,7 +503,8 @@ class CanCycle(BusCycle):
         if self._messages:
             answers = message_responses(self.traffic.longest)
             latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
-            response = f"{_short(worst.us)} us of {_short(latest.deadline_us)}"
+            due = "without a deadline" if latest.deadline_us == NO_DEADLINE_US else f"of {_short(latest.deadline_us)}"
+            response = f"{_short(worst.us)} us {due}"
             words = response if worst.us < inf else "without a worst-case response time"
             lines.append(("latest message", f"{latest.name}, {words}"))
         possible_us = plain(self.possible_us())
@@ -627,12 +631,13 @@ class CanCycle(BusCycle):
             "execution_us": 0.0,
             "pipeline_us": 0.0,
         }
+        deadline_us = figure("deadline_us", f"deadline of {name}")
         return _numbered(
             parts_us,
             identifier=figure("last", f"identifier of {name}"),
             data_bytes=figure("data_bytes", f"data of {name}"),
             instance=instance,
-            deadline_us=figure("deadline_us", f"deadline of {name}"),
+            deadline_us=inf if plain(deadline_us) == NO_DEADLINE_US else deadline_us,
         )
 
 
