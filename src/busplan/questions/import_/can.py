@@ -35,6 +35,8 @@ LEAST, SHOWN, ASK = "least_bit_rate", "shown_bit_rate", "ask_bit_rate"
 """What a log alone says of the bit rate: the least, the one that its frames show, or the question for it."""
 FULLEST, SENT = "fullest", "sent"
 """The fullest second of a log; stamps of a message in it, with their step [us]."""
+MOST_OF_FULLEST: Final = 1.2
+"""Most load of the plan of a log, by that of its fullest second, where its messages come at the same times."""
 _MOST_JITTER: Final = 0.5
 """Most jitter of a periodic message whose deadline is its period, in periods."""
 _CLEARLY: Final = 0.02
@@ -65,9 +67,7 @@ class MostLoad(NamedTuple):
     """All seconds of the log, the last one begun [1]."""
 
 
-def timing_facts(
-    model: EventModel, period_us: float, place: str, *, is_periodic: bool
-) -> Iterator[tuple[str, Fact]]:
+def timing_facts(model: EventModel, period_us: float, place: str, *, is_periodic: bool) -> Iterator[tuple[str, Fact]]:
     """Jitter and burst of a message by a log, and that it has no deadline where that is not its period."""
     burst, jitter_us = model
     if jitter_us:

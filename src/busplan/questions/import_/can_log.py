@@ -18,6 +18,7 @@ from busplan.questions.import_.can import (
     DATA_BIT_RATE,
     FULLEST,
     LEAST,
+    MOST_OF_FULLEST,
     SENT,
     SHOWN,
     MostLoad,
@@ -56,8 +57,6 @@ _LEAST_US: Final = 30.0
 """No two frames of an identifier are closer [us]."""
 _MOST_US: Final = 1e8
 """Longest period, so that several of them are no longer than a profile allows [us]."""
-MOST_OF_FULLEST: Final = 1.2
-"""Most load of a plan, by that of the fullest second of its log."""
 _LONGER: Final = 1.5
 """Factor from a window to the next one that is tried."""
 _ALWAYS: Final = 0.9
