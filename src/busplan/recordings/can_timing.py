@@ -253,7 +253,8 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
 
     closer = rates(1, 0.0) > MOST_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
-    windows, late_us = (4, *_WINDOWS), _LATE_US
+    windows: Sequence[int] = (4, *_WINDOWS)
+    late_us = _LATE_US
     if np.count_nonzero(closer) >= LEAST_EVENTS:
         starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
         at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / MOST_BIT_RATE

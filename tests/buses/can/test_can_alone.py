@@ -253,7 +253,7 @@ def test_a_message_without_a_deadline_is_late_only_without_an_end(run: Run, tmp_
     path = tmp_path / "car.toml"
     for own in (free, car(**burst, **none)):
         path.write_text(machines.text_of(own), encoding="utf-8")
-        card = run("capacity", str(path)).stdout
+        card = " ".join(run("capacity", str(path)).stdout.split())
         number = sum(message.deadline_us == "none" for message in own.message)
         assert f"no deadline of {number} messages" in card
         assert ("without a deadline" in card) is (number == 3)

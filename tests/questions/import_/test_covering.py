@@ -18,6 +18,8 @@ import busplan
 
 BIT_RATE: Final = 500
 SPANS_S: Final = (0.4, 1.3, 3, 10, 40)
+MOST_FRAMES: Final = 250
+"""Of an identifier, for the oracle counts every window."""
 Times = list[int]
 """Stamps of an identifier, ascending [us]."""
 
@@ -89,17 +91,18 @@ def traffic(sort: str, seed: int) -> dict[int, Times]:
     times: dict[int, Times] = {}
     taken: set[int] = set()
     for identifier in random.sample(range(0x10, 0x7F0), random.randint(1, 12)):
-        each = []
+        each: Times = []
         for us in sorted(random.choice(SORTS[sort])(random, span_us)):
             stamp = int(us)
             while stamp in taken:
                 stamp += 1
-            if us < span_us and len(each) < 2000:
+            if us < span_us and len(each) < MOST_FRAMES:
                 taken.add(stamp)
                 each.append(stamp)
         if each:
             times[identifier] = sorted(each)
-    return times
+    # Of fewer frames there is no plan.
+    return times if max(map(len, times.values()), default=0) >= 10 else traffic(sort, seed + 10_000)
 
 
 def log_of(times: dict[int, Times]) -> str:
@@ -116,13 +119,16 @@ def messages_of(answer: busplan.ImportAnswer) -> dict[int, Any]:
 
 
 def uncovered(message: Any, times: Times) -> list[tuple[int, int]]:
-    """Windows with more frames than b - 1 + ceil((w + J) / T): number of frames, and what just holds them [us]."""
-    period, jitter = Fraction(str(message.period_us)), Fraction(str(message.jitter_us))
+    """Windows with more frames than b - 1 + ceil((w + J) / T): number of frames, and what just holds them [us].
+
+    Counted in nanoseconds, the last digit of a profile's period.
+    """
+    period, jitter = (round(us * 1000) for us in (message.period_us, message.jitter_us))
     found = []
     for first, start in enumerate(times):
         for number, end in enumerate(times[first:], start=1):
             # A window just longer than from the first of them to the last.
-            allowed = message.burst + (end - start + jitter) // period
+            allowed = message.burst + ((end - start) * 1000 + jitter) // period
             if number > allowed:
                 found.append((number, end - start))
     return found
@@ -156,7 +162,9 @@ def ratio_of(answer: busplan.ImportAnswer, times: dict[int, Times]) -> float:
 
 def of_own_seconds(answer: busplan.ImportAnswer, times: dict[int, Times]) -> float:
     """Load of the fullest second of each identifier by itself, all together, by that of the fullest of all."""
-    most_bits = {identifier: bits(each.payload_bytes, is_extended=False) for identifier, each in messages_of(answer).items()}
+    most_bits = {
+        identifier: bits(each.payload_bytes, is_extended=False) for identifier, each in messages_of(answer).items()
+    }
     own = (
         max(bisect_left(each, us + 10**6) - place for place, us in enumerate(each)) * most_bits[identifier]
         for identifier, each in times.items()
@@ -170,7 +178,7 @@ def require_covered(answer: busplan.ImportAnswer, times: dict[int, Times]) -> No
     assert found == {identifier: [] for identifier in times}
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("sort", SORTS)
 def test_the_plan_of_a_log_allows_every_window_and_little_more_load(sort: str, seed: int, tmp_path: Path) -> None:
     times = traffic(sort, seed)
@@ -193,16 +201,19 @@ def full_for_a_while(random: Random) -> dict[int, Times]:
 
 CASES: Final[dict[str, tuple[Callable[[Random], dict[int, Times]], float]]] = {
     "one burst of twenty": (
-        lambda _: {0x10: [k * 100_000 for k in range(600)], 0x20: [30_000_300 + k * 1000 for k in range(20)]},
+        lambda _: {0x10: [k * 100_000 for k in range(300)], 0x20: [20_000_300 + k * 1000 for k in range(20)]},
         0.3,
     ),
     "on for three seconds": (
-        lambda _: {0x10: [k * 100_000 for k in range(600)], 0x20: [20_000_300 + k * 5000 for k in range(600)]},
+        lambda _: {0x10: [k * 100_000 for k in range(300)], 0x20: [20_000_300 + k * 10_000 for k in range(300)]},
         0.98,
     ),
-    "five, and a second of silence": (lambda _: {0x10: [s * 10**6 + k * 700 for s in range(20) for k in range(5)]}, 0.8),
+    "five, and a second of silence": (
+        lambda _: {0x10: [s * 10**6 + k * 700 for s in range(20) for k in range(5)]},
+        0.8,
+    ),
     "full for 1.5 s": (full_for_a_while, 0.85),
-    "two modes": (lambda _: {0x10 + n: [n * 4 * 10**6 + k * 1000 for k in range(4000)] for n in range(2)}, 1.9),
+    "two modes": (lambda _: {0x10 + n: [n * 2 * 10**6 + k * 2000 for k in range(1000)] for n in range(2)}, 1.9),
 }
 
 
@@ -226,7 +237,7 @@ def test_a_period_of_a_database_covers_the_log_too(tmp_path: Path) -> None:
     """A longer one by little, which counts as the same, and a shorter one."""
     random = Random(4)
     for period_ms, recorded_us in ((100, 99_000), (50, 100_000)):
-        times = {0x101: [round(k * recorded_us + random.uniform(0, 3e4)) for k in range(900)]}
+        times = {0x101: [round(k * recorded_us + random.uniform(0, 3e4)) for k in range(300)]}
         log, base = tmp_path / "drive.log", tmp_path / "car.dbc"
         log.write_text(log_of(times))
         base.write_text(

@@ -380,9 +380,11 @@ NO_DEADLINE_US: Final = 1e12
 
 
 def _deadline_us(message: Any) -> Number:
-    if message.deadline_us is None:
-        return message.period_us
-    return NO_DEADLINE_US if message.deadline_us == "none" else message.deadline_us
+    deadline_us: Number | Literal["none"] | None = message.deadline_us
+    if deadline_us == "none":
+        return NO_DEADLINE_US
+    period_us: Number = message.period_us
+    return period_us if deadline_us is None else deadline_us
 
 
 def _unless(number: Number, none: int) -> Number:

@@ -415,7 +415,7 @@ class _Log:
             notes.append(f"{often.periods.missing:,} of {often.periods.places[-1] + 1:,} periods without a frame")
         # At worst the first frame was the latest that it may be, and the last one the earliest.
         scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
-        error_us = scatter_us if mean.uncertainty is None or stream.burst > 1 else mean.uncertainty
+        error_us = max(scatter_us, mean.uncertainty or 0.0)
         doubt_us = expanded(error_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
         period = RecordedFigure(
             f"{label}: period",
