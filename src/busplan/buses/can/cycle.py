@@ -445,7 +445,7 @@ class CanCycle(BusCycle):
             queues += f" (senders {first_of(list(senders), 8)})" if senders else ""
         if None in orders:
             queues = f"{queues}, others by priority: assumed" if queues else "priority queues: assumed"
-        free = sum(message.deadline_us == "none" for message in self.network.profile.message)
+        free = sum(isinstance(message.deadline_us, str) for message in self.network.profile.message)
         deadlines = (f"no deadline of {plural(free, 'message')}",) if free else ()
         if is_off(self.traffic.error_burst):
             return (queues, *deadlines, "no repeated frames")
@@ -631,13 +631,14 @@ class CanCycle(BusCycle):
             "execution_us": 0.0,
             "pipeline_us": 0.0,
         }
-        deadline_us = figure("deadline_us", f"deadline of {name}")
+        messages = self.network.profile.message
+        has_deadline = not any(isinstance(each.deadline_us, str) for each in messages if each.name == name)
         return _numbered(
             parts_us,
             identifier=figure("last", f"identifier of {name}"),
             data_bytes=figure("data_bytes", f"data of {name}"),
             instance=instance,
-            deadline_us=inf if plain(deadline_us) == NO_DEADLINE_US else deadline_us,
+            deadline_us=figure("deadline_us", f"deadline of {name}") if has_deadline else inf,
         )
 
 

@@ -381,7 +381,7 @@ NO_DEADLINE_US: Final = 1e12
 
 def _deadline_us(message: Any) -> Number:
     deadline_us: Number | Literal["none"] | None = message.deadline_us
-    if deadline_us == "none":
+    if isinstance(deadline_us, str):
         return NO_DEADLINE_US
     period_us: Number = message.period_us
     return period_us if deadline_us is None else deadline_us

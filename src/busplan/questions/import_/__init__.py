@@ -193,8 +193,8 @@ def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
     planned = float(plain(cycle.load))
     recorded = fullest.load(bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s or can.DATA_BIT_RATE)
     words = (
-        f"The plan has a load of {100 * planned:.3g} %, the fullest second of the log {100 * recorded:.3g} %, both with "
-        f"the most stuff bits; {fullest.seconds:,} of its {fullest.of_seconds:,} s have frames"
+        f"The plan has a load of {100 * planned:.3g} %, the fullest second of the log {100 * recorded:.3g} %, both "
+        f"with the most stuff bits; {fullest.seconds:,} of its {fullest.of_seconds:,} s have frames"
     )
     if planned > can.MOST_OF_FULLEST * recorded:
         words += ". It is so much more because messages of the log come at different times, and in a plan they may meet"

@@ -308,8 +308,8 @@ def _bit_rate(
     loads = [(rate, fullest.load(rate)) for rate in possible]
     listed = [f"{100 * load:.2g} % at {rate:g}" for rate, load in loads if load <= 1]
     machine.bus[ASK] = Fact(
-        f"{machine.file}: does not show the bit rate of its bus, and all times follow from it; give --bit-rate RATE, in "
-        f"kbit/s. The load of its fullest second is {', '.join(listed) or 'over 100 % at any'}"
+        f"{machine.file}: does not show the bit rate of its bus, and all times follow from it; give --bit-rate RATE, "
+        f"in kbit/s. The load of its fullest second is {', '.join(listed) or 'over 100 % at any'}"
     )
 
 
