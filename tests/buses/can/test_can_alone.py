@@ -250,11 +250,11 @@ def test_a_message_without_a_deadline_is_late_only_without_an_end(run: Run, tmp_
     assert figures(free).fits
     none = {f"message.{name}.deadline_us": "none" for name in ("wake", "lights", "doors")}
     assert figures(car(**none, **{"message.doors.period_us": 3000.0})).exceeded == ("load", "deadline")
-    path = tmp_path / "car.toml"
     for own in (free, car(**burst, **none)):
+        number = sum(message.deadline_us == "none" for message in own.message)
+        path = tmp_path / f"car-{number}.toml"
         path.write_text(machines.text_of(own), encoding="utf-8")
         card = " ".join(run("capacity", str(path)).stdout.split())
-        number = sum(message.deadline_us == "none" for message in own.message)
         assert f"no deadline of {number} messages" in card
         assert ("without a deadline" in card) is (number == 3)
         assert [each["deadline_us"] for each in phases(own).values()] == [None, None if number == 3 else 100_000, None]
