@@ -199,6 +199,15 @@ def full_for_a_while(random: Random) -> dict[int, Times]:
     return {**times, 0x700: [1_500_500 + number * 10**6 for number in range(30)]}
 
 
+def seldom(random: Random) -> dict[int, Times]:
+    """Many events in a minute, of which each comes now and then, in twos or threes."""
+    times = {}
+    for identifier in range(0x10, 0x60):
+        starts = sorted(random.randrange(60 * 10**6) for _ in range(10))
+        times[identifier] = [us + near * 1000 for us in starts for near in range(random.randint(2, 3))]
+    return {identifier: sorted(each) for identifier, each in times.items()}
+
+
 CASES: Final[dict[str, tuple[Callable[[Random], dict[int, Times]], float]]] = {
     "one burst of twenty": (
         lambda _: {0x10: [k * 100_000 for k in range(300)], 0x20: [20_000_300 + k * 1000 for k in range(20)]},
@@ -213,6 +222,7 @@ CASES: Final[dict[str, tuple[Callable[[Random], dict[int, Times]], float]]] = {
         0.8,
     ),
     "full for 1.5 s": (full_for_a_while, 0.85),
+    "seldom": (seldom, 0.2),
     "two modes": (lambda _: {0x10 + n: [n * 2 * 10**6 + k * 2000 for k in range(1000)] for n in range(2)}, 1.9),
 }
 
@@ -229,8 +239,19 @@ def test_what_was_recorded_for_a_while_is_planned_with_the_load_of_its_fullest_s
     (said,) = (remark for remark in answer.remarks if remark.startswith("The plan has a load of "))
     loads = [float(number) for number in re.findall(r"([\d.]+) %", said)]
     assert loads[0] / loads[1] == pytest.approx(ratio_of(answer, times), rel=0.02)
-    seconds = {us // 10**6 for each in times.values() for us in each}
+    start_us = min(map(min, times.values()))
+    seconds = {(us - start_us) // 10**6 for each in times.values() for us in each}
     assert f"; {len(seconds)} of its {max(seconds) + 1} s have frames" in said
+
+
+def test_a_short_row_beside_a_busy_bus_is_a_burst(tmp_path: Path) -> None:
+    """As a period for ever, its load would be little beside that of the others."""
+    times = {0x10: [k * 10_000 for k in range(1000)], 0x20: [k * 10_000 + 300 for k in range(1000)]}
+    answer = imported({**times, 0x30: [4_000_700 + k * 30_000 for k in range(20)]}, tmp_path)
+    message = messages_of(answer)[0x30]
+    # The last comes behind a period of 500 ms.
+    assert (message.burst, message.deadline_us) == (19, "none")
+    assert message.period_us == pytest.approx(9_990_000 / 20, rel=0.01)
 
 
 def test_a_period_of_a_database_covers_the_log_too(tmp_path: Path) -> None:

@@ -149,14 +149,15 @@ def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Tim
 
     A periodic message has its period. Any other one has the rate and the burst of its arrival curve at a window of a
     second. Identifiers that come at different times may so have more load than any second has: then the window grows,
-    for rates fall with it as bursts grow, until the load is `MOST_OF_FULLEST` of the fullest second, or more frames
-    would come at once than the fullest second has.
+    for rates fall with it as bursts grow, until the load is `MOST_OF_FULLEST` of the fullest second, or bursts
+    would have grown by more frames than that has.
     """
     longest_us = [_longest_us(sent) for sent in messages]
     most = MOST_OF_FULLEST * fullest_load(*_wire_us(messages, longest_us))
     window_us, share = WINDOW_US, 1.0
     rows = [sent.periods is not None for sent in messages]
     before: list[_Timing] = []
+    most_at_once_us = 0.0
     while True:
         timings = [
             _periodic(sent, stretch) if is_row else _steady(sent, stretch, window_us, share)
@@ -164,7 +165,8 @@ def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Tim
         ]
         loads = [us / timing.period_us for us, timing in zip(longest_us, timings, strict=True)]
         at_once_us = sum(us * timing.model.burst for us, timing in zip(longest_us, timings, strict=True))
-        if before and at_once_us > max(most / MOST_OF_FULLEST * WINDOW_US, sum(longest_us)):
+        most_at_once_us = most_at_once_us or at_once_us + most / MOST_OF_FULLEST * WINDOW_US
+        if at_once_us > most_at_once_us:
             return before
         if sum(loads) <= most or share < 1:
             return timings
