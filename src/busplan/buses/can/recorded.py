@@ -415,8 +415,11 @@ class _Log:
             notes.append(f"{often.periods.missing:,} of {often.periods.places[-1] + 1:,} periods without a frame")
         # At worst the first frame was the latest that it may be, and the last one the earliest.
         scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
-        error_us = max(scatter_us, mean.uncertainty or 0.0)
-        doubt_us = expanded(error_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
+        if mean.uncertainty is not None:
+            # A plan with bursts or jitter allows a row of frames that is so much faster.
+            allowed_us = (stream.burst - 1) * planned_us + plain(stream.jitter_us)
+            scatter_us = max(mean.uncertainty, allowed_us / (count - 1) / 2)
+        doubt_us = expanded(scatter_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
         period = RecordedFigure(
             f"{label}: period",
             "us",
