@@ -581,7 +581,7 @@ def import_command(
         Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is not
         shown to fit. [default: such messages are left out]
     --bit-rate RATE
-        Bit rate of a CAN bus in kbit/s, before that of any file. [default: that of a file, or that which frames of a
+        Bit rate of a CAN bus, before that of any file [kbit/s]. [default: that of a file, or that which frames of a
         log directly after each other show]
     --force
         Let -o overwrite a file that is already there.
