@@ -21,7 +21,7 @@ Run = Callable[..., CompletedProcess[str]]
 
 ROOT: Any = get_command(app)
 TOP: Any = ROOT.context_class(ROOT, info_name="busplan", **ROOT.context_settings)
-UNIT = re.compile(r"\[(us|ms|s|mm|um|mm/min|mm/s|bytes|axes|nodes|deg|dB|%|1)\]|with its unit")
+UNIT = re.compile(r"\[(us|ms|s|mm|um|mm/min|mm/s|bytes|kbit/s|axes|nodes|deg|dB|%|1)\]|with its unit")
 OF_MACHINES = tuple(Path(__file__).parents[1] / "questions" / name / "files" for name in ("import_", "measured"))
 """Folders with files of a machine."""
 PROFILES = Path(__file__).parents[2] / "profiles"

@@ -38,6 +38,7 @@ NO_QUESTION = {
     "profiles": "a list of files",
 }
 WITH_THEIR_UNIT = {
+    "bit_rate": "bit_rate_kbit_s",
     "period": "period_us",
     "duration": "duration_us",
     "payload": "payload_bytes",

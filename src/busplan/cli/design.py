@@ -557,6 +557,7 @@ def import_command(
     channel: str | None = None,
     period: str | None = None,
     nodes: str | None = None,
+    bit_rate: float | None = None,
     force: bool = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
@@ -585,6 +586,9 @@ def import_command(
     --nodes NODES
         Nodes that one EDS stands for: their number, as 8, from node-ID 1 on, or their node-IDs, as 1-8,11.
         [default: one]
+    --bit-rate RATE
+        Bit rate of a CAN bus, before that of any file [kbit/s]. [default: that of a file, or that which frames of a
+        log directly after each other show]
     --force
         Let -o overwrite a file that is already there.
     """
@@ -606,6 +610,7 @@ def import_command(
                 name=None if new is None else new.stem,
                 bus=bus,
                 channel=channel,
+                bit_rate_kbit_s=bit_rate,
                 period_us=None if period is None else time_us(period, option="--period"),
                 nodes=nodes,
                 progress=progress,

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from busplan.english import plural
+from busplan.errors import BusplanError
 from busplan.recordings.can import CanFrames
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, periodic_events
 
@@ -26,7 +27,13 @@ _LATE_US: Final = 100.0
 _LEAST_US: Final = 1e-3
 _FEW: Final = 3
 _STEP_BACK_US: Final = -1000.0
-"""A stamp further before its predecessor means that the clock was set back [us]."""
+"""A stamp further before its predecessor means another queue, another clock, or one that was set back [us]."""
+_QUEUED_US: Final = 0.5e6
+"""Longest that queues of a recorder hand their frames over one after the other [us]."""
+_SEVERAL: Final = 3
+"""Steps back from which on they are not a clock that was set back."""
+WINDOW_US: Final = 1e6
+"""Window of the fullest second [us]."""
 _PERIODIC: Final = 0.15
 """Largest standard deviation of a periodic message, as a share of its period."""
 _MISSING: Final = 0.1
@@ -115,16 +122,42 @@ class ClockStretch(NamedTuple):
     """Their stamps, ascending [us]."""
     steps_back: int
     """Number of times that the clock was set back in the whole log [1]."""
+    sorted_us: float = 0.0
+    """How far frames were out of order, where they are sorted [us]."""
+
+    @property
+    def length_us(self) -> float:
+        """From its first stamp to its last [us]."""
+        return float(self.times_us[-1] - self.times_us[0])
 
 
 def longest_stretch(frames: CanFrames) -> ClockStretch:
-    """The longest part in which the clock was not set back; small steps back are frames from different queues."""
-    steps_back = np.flatnonzero(np.diff(frames.times_us) < _STEP_BACK_US) + 1
+    """The longest part in which the clock was not set back.
+
+    Small steps back are frames from different queues, which are sorted, however often.
+
+    Raises
+    ------
+    BusplanError
+        The stamps are those of two clocks.
+    """
+    apart_us = np.diff(frames.times_us)
+    back_us = -apart_us[apart_us < _STEP_BACK_US]
+    are_queues = len(back_us) >= _SEVERAL and float(back_us.max()) <= _QUEUED_US
+    if len(back_us) >= _SEVERAL and not are_queues:
+        step_us = float(np.median(back_us))
+        if np.count_nonzero(apart_us > step_us / 2) >= len(back_us) - 1:
+            raise BusplanError(
+                f"its stamps jump back {len(back_us):,} times by about {step_us / 1e6:.3g} s, and forward again: they "
+                "are those of two clocks; export the frames of each by themselves, and give one"
+            )
+    steps_back = np.flatnonzero(apart_us < _STEP_BACK_US) + 1 if not are_queues else np.zeros(0, dtype=np.int64)
     ends = np.concatenate(([0], steps_back, [len(frames.times_us)]))
     longest = int(np.argmax(np.diff(ends)))
     taken = np.arange(ends[longest], ends[longest + 1])
     taken = taken[np.argsort(frames.times_us[taken], kind="stable")]
-    return ClockStretch(taken, frames.times_us[taken], len(steps_back))
+    late_us = float((np.maximum.accumulate(frames.times_us) - frames.times_us).max()) if are_queues else 0.0
+    return ClockStretch(taken, frames.times_us[taken], len(steps_back), late_us)
 
 
 def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tuple[int, bool], SentFrames]:
@@ -136,7 +169,7 @@ def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tu
         identifier, extended = divmod(int(key[places[0]]), 2)
         times_us, taken = stretch.times_us[places], stretch.taken[places]
         periods = periodic_events(times_us)
-        if periods is not None and not _is_periodic(periods):
+        if periods is not None and not _is_periodic(periods, stretch.length_us):
             periods = None
         messages[identifier, bool(extended)] = SentFrames(
             identifier,
@@ -150,9 +183,35 @@ def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tu
     return messages
 
 
-def _is_periodic(periods: PeriodicEvents) -> bool:
-    late_us = float(np.std(periods.late_us))
-    return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
+def _is_periodic(periods: PeriodicEvents, length_us: float) -> bool:
+    """Whether events come once a period, for a second or for all of a shorter log: a short row of them is a burst."""
+    late_us, rows_us = float(np.std(periods.late_us)), (float(periods.places[-1]) + 1) * periods.period_us
+    is_row = rows_us >= min(WINDOW_US, (1 - _MISSING) * length_us)
+    is_even = late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
+    return is_row and is_even
+
+
+def fullest_load(times_us: Floats, wire_us: Floats) -> float:
+    """Load of the fullest second, or of all of a shorter log, whose first frame ended with its stamp [1].
+
+    Parameters
+    ----------
+    times_us, wire_us
+        Ascending stamps, not all alike, and the time on the wire, of n frames [us].
+
+    Examples
+    --------
+    >>> fullest_load(np.array([0.0, 0.5e6, 1.2e6, 2.3e6]), np.array([100.0, 200, 300, 400]))
+    0.0005
+    >>> fullest_load(np.array([0.0, 1e3]), np.array([100.0, 200]))
+    0.2
+    """
+    span_us = float(times_us[-1] - times_us[0])
+    if span_us < WINDOW_US:
+        return float(wire_us[1:].sum()) / span_us
+    sent_us = np.concatenate(([0.0], np.cumsum(wire_us)))
+    ends = np.searchsorted(times_us, times_us + WINDOW_US, side="left")
+    return float((sent_us[ends] - sent_us[:-1]).max()) / WINDOW_US
 
 
 def step_us(stretch: ClockStretch) -> float:
@@ -194,13 +253,13 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
 
     closer = rates(1, 0.0) > MOST_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
-    if np.count_nonzero(closer) < LEAST_EVENTS:
-        least = most((4, *_WINDOWS), _LATE_US)
-    else:
+    windows: Sequence[int] = (4, *_WINDOWS)
+    late_us = _LATE_US
+    if np.count_nonzero(closer) >= LEAST_EVENTS:
         starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
         at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / MOST_BIT_RATE
-        least = most(_WINDOWS, min(at_once_us, _LATEST_US))
-    return LeastBitRate(least, most((4, *_WINDOWS), _LATEST_US))
+        windows, late_us = _WINDOWS, min(at_once_us, _LATEST_US)
+    return LeastBitRate(most(windows, late_us), most(windows, _LATEST_US))
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:
@@ -218,3 +277,5 @@ def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
         yield f"The log is cut or damaged after frame {len(frames.times_us):,}, read up to there: {frames.broken}."
     if stretch.steps_back:
         yield f"Its clock was set back {plural(stretch.steps_back, 'time')}: the longest stretch between is taken."
+    if stretch.sorted_us:
+        yield f"Its frames are up to {stretch.sorted_us / 1000:.3g} ms out of order, as from several queues: sorted."

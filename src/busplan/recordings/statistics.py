@@ -28,6 +28,8 @@ _EARLY_SHARE: Final = 0.999
 """Quantile that counts as the earliest event: the stamps of the few before it may be wrong."""
 _AHEAD: Final = 20
 """Events after a block that are read, too, so that a late event at its end is seen."""
+_ROUNDING: Final = 1e-6
+"""Events by which float rounding may lift a point over a line."""
 _COVERAGE: Final = 2
 """Coverage factor k of an expanded uncertainty."""
 
@@ -172,6 +174,55 @@ def ahead(times_us: Floats, period_us: float) -> Floats:
     """
     early = np.arange(len(times_us)) * period_us - times_us
     return np.asarray(early - np.minimum.accumulate(early), dtype=np.float64)
+
+
+def steady_rate(times_us: Floats, window_us: float) -> float:
+    """Slope of the concave hull of the arrival curve at a window: the most events of windows about so long [1/us].
+
+    The arrival curve is the most events n that come within a time w, anywhere. Of all rates r with the burst b that
+    makes b + r w hold it, this one has the least b + r w at the window. It is 0 where all events come in less time.
+
+    Parameters
+    ----------
+    times_us
+        Ascending times, n of them [us].
+    window_us
+        The window [us].
+
+    References
+    ----------
+    J.-Y. Le Boudec, P. Thiran, Network Calculus, 2001: arrival curves, and token buckets that hold them.
+
+    Examples
+    --------
+    Five at once, each second:
+
+    >>> times_us = np.repeat(np.arange(10) * 1e6, 5)
+    >>> steady_rate(times_us, 1e3), steady_rate(np.zeros(5), 1e3)
+    (5e-06, 0.0)
+    """
+    count, span_us = len(times_us), float(times_us[-1] - times_us[0])
+    if span_us <= window_us:
+        return 0.0
+    order = np.arange(count)
+    left, right = (1, 0.0), (count, span_us)
+    while True:
+        rate = (right[0] - left[0]) / (right[1] - left[1])
+        excess = order - rate * times_us
+        least = np.minimum.accumulate(excess)
+        last = int(np.argmax(excess - least))
+        first = int(np.argmax(excess[: last + 1] == least[last]))
+        number, apart_us = last - first + 1, float(times_us[last] - times_us[first])
+        # No point of the curve lies above the line from the one before the window to the one behind it.
+        if number <= left[0] + rate * (apart_us - left[1]) + _ROUNDING or not left[1] < apart_us < right[1]:
+            if apart_us == left[1] == 0 and number > left[0]:
+                left = (number, 0.0)
+                continue
+            return rate
+        if apart_us <= window_us:
+            left = (number, apart_us)
+        else:
+            right = (number, apart_us)
 
 
 def _period(times_us: Floats, period_us: float) -> float:

@@ -241,6 +241,38 @@ def test_the_verdict_is_by_load_and_deadlines() -> None:
     assert full.verdicts[0].deciding.exceeded == ("load",)
 
 
+def test_a_message_without_a_deadline_is_late_only_without_an_end(run: Run, tmp_path: Path) -> None:
+    burst = {"message.doors.burst": 40}
+    late: Any = car(**burst)
+    free: Any = car(**burst, **{"message.doors.deadline_us": "none", "message.wake.deadline_us": "none"})
+    assert figures(late).exceeded == ("deadline",)
+    assert responses(free) == responses(late)
+    assert figures(free).fits
+    none = {f"message.{name}.deadline_us": "none" for name in ("wake", "lights", "doors")}
+    assert figures(car(**none, **{"message.doors.period_us": 3000.0})).exceeded == ("load", "deadline")
+    for own in (free, car(**burst, **none)):
+        number = sum(message.deadline_us == "none" for message in own.message)
+        path = tmp_path / f"car-{number}.toml"
+        path.write_text(machines.text_of(own), encoding="utf-8")
+        card = " ".join(run("capacity", str(path)).stdout.split())
+        assert f"no deadline of {number} messages" in card
+        assert ("without a deadline" in card) is (number == 3)
+        assert [each["deadline_us"] for each in phases(own).values()] == [None, None if number == 3 else 100_000, None]
+
+
+def test_a_message_without_a_deadline_blocks_as_one_that_may_be_late_for_ever() -> None:
+    """The wait of a cycle, with SYNC or with requests, is no shorter than with any deadline."""
+    for name in ("can-servo-8", "can-motors-8"):
+        message = {"name": "slow", "identifier": 0x7F0, "payload_bytes": 8, "period_us": 50_000.0}
+        us = []
+        for deadline_us in (1000.0, 1e6, 1e9, "none"):
+            data: Any = busplan.load_profile(name).model_dump(exclude_unset=True)
+            data["message"] = [{**message, "deadline_us": deadline_us}]
+            us.append(figures(loaded(data)).required_us)
+        assert us == sorted(us)
+        assert us[-1] == us[-2] < float("inf")
+
+
 def test_a_card_says_loads_and_the_latest_message_and_nothing_of_a_cycle(run: Run, tmp_path: Path) -> None:
     (tmp_path / "car.toml").write_text(CAR, encoding="utf-8")
     said = run("capacity", "car.toml", cwd=tmp_path).stdout

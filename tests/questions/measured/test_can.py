@@ -4,12 +4,13 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import can
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import busplan
@@ -78,6 +79,43 @@ def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> 
     assert figure(answer, "sdo-request: period").note == "not periodic"
     last = max(frame.us % 4000 for frame in logged if 0x181 <= frame.identifier <= 0x208)
     assert figure(answer, "last PDO after SYNC").recorded == pytest.approx(last - 47, abs=60)
+
+
+def test_the_load_is_the_mean_and_that_of_the_fullest_second(tmp_path: Path) -> None:
+    """A second of traffic in a minute."""
+    logged = [Logged(k * 1000.0, 0x100, b"\x5a" * 8, False, 0) for k in range(1001)]
+    logged += [Logged(k * 1e6, 0x101, b"\x5a" * 8, False, 0) for k in range(2, 61)]
+    answer = of_log(candump(logged), tmp_path)
+    mean, fullest = figure(answer, "load "), figure(answer, "load, fullest second")
+    us = bits_of(logged[0]._replace(us=0.0))
+    assert mean.recorded == pytest.approx((1000 + 59) * us / 60e6, rel=0.01)
+    assert fullest.recorded == pytest.approx(1000 * us / 1e6, rel=0.01)
+    assert (fullest.planned, fullest.verdict) == (mean.planned, None)
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([0, 1, 2, 30, 150, 230, 600, 2000, 100_000]), st.sampled_from([0x80, 0x181, 0x7FF])),
+        min_size=2,
+        max_size=90,
+    ),
+    st.integers(1, 6),
+)
+@example([(100_000, 0x181), *[(2, 0x181)] * 4] * 8, 6)
+def test_no_doubt_is_negative(steps: list[tuple[int, int]], repeated: int) -> None:
+    """Of no figure: of batches that a driver reads at once, of bursts, or of a few frames."""
+    stamps = np.cumsum([us for us, _ in steps * repeated])
+    identifiers = [identifier for _, identifier in steps * repeated]
+    rows = [Logged(us, each, bytes(8), False, 0) for us, each in zip(stamps.tolist(), identifiers, strict=True)]
+    with TemporaryDirectory() as folder:
+        answer = of_log(candump(rows), Path(folder))
+    assert [row for row in answer.figures if (row.uncertainty or 0.0) < 0] == []
+
+
+def test_a_log_of_two_clocks_is_refused(tmp_path: Path) -> None:
+    text = "".join(f"({k / 1000 + s:.6f}) can0 181#00\n" for k in range(40) for s in (0, 19))
+    with pytest.raises(BusplanError, match=r"bus.log: its stamps jump back 39 times by about 19 s, and forward again"):
+        of_log(text, tmp_path)
 
 
 def test_every_format_has_the_same_frames(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from busplan.buses.can.equations import BUS_LOAD, TERMS, bit_us, c, payload_us
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
+    NO_DEADLINE_US,
     NOT_BY_PRIORITY,
     REPEATED,
     SYNC,
@@ -57,7 +58,7 @@ from busplan.elementwise import (
     value_of,
     within,
 )
-from busplan.english import first_of
+from busplan.english import first_of, plural
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
@@ -504,9 +505,12 @@ class CanCycle(BusCycle):
         if self._messages:
             answers = message_responses(self.traffic.longest)
             latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
-            response = f"{_short(worst.us)} us of {_short(latest.deadline_us)}"
+            due = "without a deadline" if latest.deadline_us == NO_DEADLINE_US else f"of {_short(latest.deadline_us)}"
+            response = f"{_short(worst.us)} us {due}"
             words = response if worst.us < inf else "without a worst-case response time"
-            lines.append(("latest message", f"{latest.name}, {words}"))
+            free = sum(message.deadline_us == NO_DEADLINE_US for message in self._messages)
+            others = f"; {plural(free, 'message')} without a deadline" if free and "without" not in words else ""
+            lines.append(("latest message", f"{latest.name}, {words}{others}"))
         possible_us = plain(self.possible_us())
         if possible_us:
             why = "frames of a burst wait" if self.traffic.access == "burst" else "messages in queues wait"
@@ -646,12 +650,14 @@ class CanCycle(BusCycle):
             "execution_us": 0.0,
             "pipeline_us": 0.0,
         }
+        messages = self.network.profile.message
+        has_deadline = not any(isinstance(each.deadline_us, str) for each in messages if each.name == name)
         return _numbered(
             parts_us,
             identifier=figure("last", f"identifier of {name}"),
             data_bytes=figure("data_bytes", f"data of {name}"),
             instance=instance,
-            deadline_us=figure("deadline_us", f"deadline of {name}"),
+            deadline_us=figure("deadline_us", f"deadline of {name}") if has_deadline else inf,
         )
 
 

@@ -369,13 +369,25 @@ def _message(message: Any, bus: Any, nodes: Number) -> Message:
         message.payload_bytes,
         message.period_us,
         message.jitter_us,
-        message.period_us if message.deadline_us is None else message.deadline_us,
+        _deadline_us(message),
         bus.identifier_bits if message.identifier_bits is None else message.identifier_bits,
         nodes if message.per_node else 1,
         0.0 if not message.fd else bus.data_bit_rate_kbit_s if message.brs else bus.bit_rate_kbit_s,
         # A burst of one is none.
         _unless(message.burst, 1),
     )
+
+
+NO_DEADLINE_US: Final = 1e12
+"""Deadline of a message that has none [us]: more than any other, and finite, for it is divided by periods."""
+
+
+def _deadline_us(message: Any) -> Number:
+    deadline_us: Number | Literal["none"] | None = message.deadline_us
+    if isinstance(deadline_us, str):
+        return NO_DEADLINE_US
+    period_us: Number = message.period_us
+    return period_us if deadline_us is None else deadline_us
 
 
 def _unless(number: Number, none: int) -> Number:

@@ -17,6 +17,7 @@ from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
 from busplan.english import first_of, plural
+from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.can_timing import (
@@ -25,6 +26,7 @@ from busplan.recordings.can_timing import (
     event_model,
     faults,
     frames_by_identifier,
+    fullest_load,
     least_bit_rate,
     longest_stretch,
     mean_period,
@@ -65,10 +67,13 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     Raises
     ------
     BusplanError
-        No log of a single channel with frames.
+        No log of a single channel with frames, or one of two clocks.
     """
     frames = read_can(path, channel=channel, progress=progress)
-    log = _Log(network, frames, share)
+    try:
+        log = _Log(network, frames, share)
+    except BusplanError as error:
+        raise BusplanError(f"{path}: {error}") from None
     day = day_of(int(frames.start_s * 1e9))
     compared = Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))
     return compared.unless_synthetic(frames.synthetic)
@@ -255,7 +260,10 @@ class _Log:
         return us
 
     def _load(self) -> Iterator[RecordedFigure]:
-        """Recorded load, the planned load, and the recorded frames with the most stuff bits and with none."""
+        """Mean load and that of the fullest second, the planned load, and the frames with the most stuff bits and none.
+
+        A second may be fuller than the plan, which is a mean over longer times: it is not judged.
+        """
         count, is_fd = len(self.taken), self.frames.is_fd[self.taken]
         span_us = float(self.times_us[-1] - self.times_us[0])
         is_whole = self.has_switch or not self.frames.switched[self.taken].any()
@@ -271,12 +279,15 @@ class _Log:
         more_us = wire_us[np.unique(keys, return_index=True)[1]].sum()
         stuffing_us = (worst_us - none_us)[1:][is_fd[1:]].sum() / 2
         doubt = float(more_us + load * self.stamp_error_us + stuffing_us) / span_us
-        note, planned = "exact bits of each classical frame, at the bit rate of the profile", plain(self.cycle.load)
+        note = "mean; exact bits of each classical frame, at the bit rate of the profile"
+        planned = plain(self.cycle.load)
         if is_whole:
             yield RecordedFigure("load", "share", planned, load, doubt, "at most", count, note=note)
         else:
             note = f"{note}; without frames of CAN FD that switch"
             yield RecordedFigure("load", "share", planned, load, None, "shown", count, note=note)
+        fullest = fullest_load(self.times_us, wire_us)
+        yield RecordedFigure("load, fullest second", "share", planned, fullest, None, "shown", count)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
         classical, possible_us = ~is_fd, float((worst_us - none_us)[~is_fd].sum())
@@ -414,8 +425,11 @@ class _Log:
             notes.append(f"{often.periods.missing:,} of {often.periods.places[-1] + 1:,} periods without a frame")
         # At worst the first frame was the latest that it may be, and the last one the earliest.
         scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
-        error_us = scatter_us if mean.uncertainty is None else mean.uncertainty
-        doubt_us = expanded(error_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
+        if mean.uncertainty is not None:
+            # A plan with bursts or jitter allows a row of frames that is so much faster.
+            allowed_us = (stream.burst - 1) * planned_us + plain(stream.jitter_us)
+            scatter_us = max(mean.uncertainty, allowed_us / (count - 1) / 2)
+        doubt_us = expanded(scatter_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
         period = RecordedFigure(
             f"{label}: period",
             "us",

@@ -249,9 +249,10 @@ class CanMessage(Section):
     jitter_us: TimeUs = Field(
         default=0.0, description="How late it may be queued; may exceed the period [us]", examples=[500]
     )
-    deadline_us: PeriodUs | None = Field(
+    deadline_us: PeriodUs | Literal["none"] | None = Field(
         default=None,
-        description="Time from its start to its arrival, at most; without it the period [us]",
+        description='Time from its start to its arrival, at most; "none" for a message that has none; without it the '
+        "period [us]",
         examples=[5000],
     )
 

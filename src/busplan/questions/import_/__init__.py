@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Final
+from typing import Any, Final
 
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -108,6 +108,7 @@ def import_profile(
     channel: str | None = None,
     period_us: float | None = None,
     nodes: str | int | Iterable[int] | None = None,
+    bit_rate_kbit_s: float | None = None,
     progress: Progress | None = None,
 ) -> ImportAnswer:
     """Make a profile of the files of one machine.
@@ -128,6 +129,8 @@ def import_profile(
         Period of every message that no file gives one; it is assumed, so the plan is not shown to fit [us].
     nodes
         Nodes that an EDS stands for: their number, from node-ID 1 on, or their node-IDs; as text "8" or "1-8,11".
+    bit_rate_kbit_s
+        Bit rate of a CAN bus, before that of any file; of a log that does not show it, none can be left out [kbit/s].
     progress
         Called with the bytes read of a log and the size of the file [bytes].
 
@@ -173,6 +176,10 @@ def import_profile(
     machine = merged(readings)
     if period_us is not None:
         can.assume_periods(machine, finite(period_us, name="period_us"))
+    if bit_rate_kbit_s is not None:
+        if machine.kind != "can":
+            raise BusplanError(f"bit rate {bit_rate_kbit_s:g}: the files are of no CAN bus")
+        can.give_bit_rate(machine, finite(bit_rate_kbit_s, name="bit_rate_kbit_s"))
     title = name or ("machine" if names[0] == "-" else FilePath(names[0]).stem)
     rows = list(_ROWS[machine.kind](machine))
     text = profile_text(rows, name=title, readings=readings)
@@ -183,7 +190,24 @@ def import_profile(
         rows.insert(at, more)
         text = profile_text(rows, name=title, readings=readings)
         profile = _validated(text, machine)
+    if can.FULLEST in machine.bus:
+        machine.remarks.append(_load_words(profile, machine.bus[can.FULLEST].value))
     return ImportAnswer(profile, text, tuple(rows), tuple(machine.remarks))
+
+
+def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
+    """The load of the plan beside that of the log."""
+    bus: Any = profile.bus
+    cycle: Any = deciding_cycle(network_of(profile))
+    planned = float(plain(cycle.load))
+    recorded = fullest.load(bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s or can.DATA_BIT_RATE)
+    words = (
+        f"The plan has a load of {100 * planned:.3g} %, the fullest second of the log {100 * recorded:.3g} %, both "
+        f"with the most stuff bits; {fullest.seconds:,} of its {fullest.of_seconds:,} s have frames"
+    )
+    if planned > can.MOST_OF_FULLEST * recorded:
+        words += ". It is so much more because messages of the log come at different times, and in a plan they may meet"
+    return words
 
 
 def _validated(text: str, machine: Reading) -> Profile:

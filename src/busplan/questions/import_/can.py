@@ -1,7 +1,8 @@
 """The profile of a CAN bus: CANopen nodes in groups, and all other messages."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
+from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.frames import HOST
@@ -20,6 +21,7 @@ from busplan.questions.import_.reading import (
     lines,
     usual_period,
 )
+from busplan.recordings.can_timing import EventModel, event_model
 
 _DIRECTIONS: Final = {"feedback": "read_bytes", "command": "write_bytes"}
 _FRAME_BYTES: Final = 8
@@ -37,11 +39,19 @@ _BY_THE_HOST: Final = (0x200, 0x300, 0x400, 0x500, 0x600)
 _EMERGENCY_US: Final = 1_000_000.0
 """An event of a fault, sent once for each: one in a second is assumed [us]."""
 BIT_RATE: Final = "bit_rate_kbit_s"
-LEAST, SHOWN = "least_bit_rate", "shown_bit_rate"
-"""What a log alone says of the bit rate, for `settle`."""
+LEAST, SHOWN, ASK = "least_bit_rate", "shown_bit_rate", "ask_bit_rate"
+"""What a log alone says of the bit rate: the least, the one that its frames show, or the question for it."""
+FULLEST, SENT = "fullest", "sent"
+"""The fullest second of a log; stamps of a message in it, with their step [us]."""
+MOST_OF_FULLEST: Final = 1.2
+"""Most load of the plan of a log, by that of its fullest second, where its messages come at the same times."""
+_MOST_JITTER: Final = 0.5
+"""Most jitter of a periodic message whose deadline is its period, in periods."""
 _CLEARLY: Final = 0.02
 """By how much a recorded period is shorter than that of a database where it counts, as a share."""
 _DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
+DATA_BIT_RATE: Final = 2000.0
+"""Data bit rate of CAN FD, where no file says it [kbit/s]."""
 _USUAL_BIT_RATE: Final = 1000
 """Bit rates of machines [kbit/s]."""
 _USUAL_OF_CARS: Final = 500
@@ -52,6 +62,29 @@ _OF_A_MESSAGE: Final = ("sender", "payload_bytes", "period_us", "period_grade", 
 _ASSUME: Final = "a log of the bus beside it shows it, and --period 100ms takes one for all such messages, as assumed"
 _BASE_BITS: Final = 11
 _EXTENDED_BITS: Final = 29
+
+
+class MostLoad(NamedTuple):
+    """The fullest second of a log."""
+
+    load: Callable[..., float]
+    """Its load by the bit rate and the data bit rate [kbit/s], each frame as long as the longest of its identifier."""
+    seconds: int
+    """Seconds of the log that have frames [1]."""
+    of_seconds: int
+    """All seconds of the log, the last one begun [1]."""
+
+
+def timing_facts(model: EventModel, period_us: float, place: str, *, is_periodic: bool) -> Iterator[tuple[str, Fact]]:
+    """Jitter and burst of a message by a log, and that it has no deadline where that is not its period."""
+    burst, jitter_us = model
+    if jitter_us:
+        note = "of the arrival, the wait for other frames in it" if is_periodic else "the soonest after another"
+        yield "jitter_us", Fact(jitter_us, place, "measured", note)
+    if burst > 1:
+        yield "burst", Fact(burst, place, "measured", "so many come together")
+    if not is_periodic or burst > 1 or jitter_us > _MOST_JITTER * period_us:
+        yield "deadline_us", assumed("none", "nobody gave one, and it does not keep to a period")
 
 
 class _Node(NamedTuple):
@@ -74,7 +107,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     Raises
     ------
     BusplanError
-        There are no messages either.
+        There are no messages either, or a log of them shows no bit rate and none is given.
     """
     bus, nodes = machine.bus, list(_nodes(machine))
     _require_slaves(machine)
@@ -89,13 +122,15 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         reason = "no message with a period, and no node with PDOs"
         raise BusplanError(f"{machine.file}: {reason}; {_ASSUME}", *machine.remarks)
     yield ProfileLine("bus", "kind", machine.fact("can", 1))
+    if BIT_RATE not in bus and ASK in bus:
+        raise BusplanError(bus[ASK].value)
     usual = assumed(_USUAL_OF_CARS, "no file says it, and all times follow from it")
     if nodes:
         usual = assumed(_USUAL_BIT_RATE, "no file says it; the cable decides")
     yield ProfileLine("bus", BIT_RATE, bus.get(BIT_RATE) or usual)
     if sum(row.key == "fd" for row in messages) > sum(row.key == "brs" for row in messages):
         note = f"no file says it{'; SYNC and PDOs are FD frames with it, too' if nodes else ''}"
-        yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or assumed(2000, note))
+        yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or assumed(DATA_BIT_RATE, note))
     if bits != _BASE_BITS:
         yield ProfileLine("bus", "identifier_bits", machine.fact(bits, 1, note="of most messages"))
     if nodes:
@@ -410,18 +445,37 @@ def _settle_message(recorded: Facts, stated: Facts, log: Reading) -> None:
             f"{stated['name'].value} comes every {recorded['period_us'].value:,.0f} us in {log.file}, every "
             f"{period.value:,.0f} by {period.place}: the log's is taken"
         )
-    else:
-        # It comes in the bursts of the log all the same, and its deadline is that of the log.
-        del recorded["period_us"]
+        return
+    # It comes as early as in the log all the same.
+    times_us, error_us = recorded[SENT].value
+    model = event_model(times_us, period.value, stamp_error_us=error_us, tolerance=0.0)
+    for key in ("period_us", "jitter_us", "burst", "deadline_us"):
+        recorded.pop(key, None)
+    recorded.update(timing_facts(model, period.value, PurePath(log.file).name, is_periodic=True))
+
+
+def give_bit_rate(machine: Reading, bit_rate_kbit_s: float) -> None:
+    """Take the bit rate that the user gives [kbit/s].
+
+    Raises
+    ------
+    BusplanError
+        Frames of a log need more.
+    """
+    least = machine.bus[LEAST].value.surely if LEAST in machine.bus else 0.0
+    if bit_rate_kbit_s < least:
+        raise BusplanError(
+            f"bit rate {bit_rate_kbit_s:g}: frames of the log need no less than {least:.3g} kbit/s, for they do not "
+            "overlap"
+        )
+    machine.bus[BIT_RATE] = Fact(bit_rate_kbit_s, note="as given to import")
 
 
 def _settle_bit_rate(log: Reading, database: Reading) -> None:
-    stated, least, shown = database.bus[BIT_RATE], log.bus.get(LEAST), log.bus.get(SHOWN)
-    if least is None or (least.value <= stated.value and (shown is None or shown.value == stated.value)):
+    stated, least, shown = database.bus[BIT_RATE], log.bus[LEAST].value.surely, log.bus.get(SHOWN)
+    if least <= stated.value and (shown is None or shown.value == stated.value):
         log.bus.pop(BIT_RATE, None)
         return
     del database.bus[BIT_RATE]
-    log.remarks.append(
-        f"{database.file} says {stated.value:g} kbit/s and {log.file} shows {log.bus[BIT_RATE].value:g}: the log's is "
-        "taken"
-    )
+    found = f"shows {shown.value:g}: the log's is taken" if shown else f"needs no less than {least:.3g}"
+    log.remarks.append(f"{database.file} says {stated.value:g} kbit/s and {log.file} {found}")

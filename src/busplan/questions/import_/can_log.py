@@ -1,34 +1,49 @@
 """Logs of a CAN bus: candump -l, ASC, BLF, TRC. Identifiers, lengths, periods, jitter, bursts, and a least bit rate."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from math import floor, log10
 from pathlib import Path, PurePath
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from busplan.buses.can.equations import BASE_BITS, frame_us
 from busplan.buses.rule import CLOCK_TOLERANCE
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
-from busplan.questions.import_.can import BIT_RATE, LEAST, SHOWN
+from busplan.questions.import_.can import (
+    ASK,
+    BIT_RATE,
+    DATA_BIT_RATE,
+    FULLEST,
+    LEAST,
+    MOST_OF_FULLEST,
+    SENT,
+    SHOWN,
+    MostLoad,
+    timing_facts,
+)
 from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.reading import Fact, Reading, assumed
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.can_timing import (
     LISTED,
+    WINDOW_US,
     ClockStretch,
     EventModel,
+    LeastBitRate,
     SentFrames,
     event_model,
     faults,
     frames_by_identifier,
+    fullest_load,
     least_bit_rate,
     longest_stretch,
     stamps_of_no_bus,
     step_us,
 )
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, steady_rate
 
 _BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
 """Usual bit rates [kbit/s]."""
@@ -42,7 +57,14 @@ _LEAST_US: Final = 30.0
 """No two frames of an identifier are closer [us]."""
 _MOST_US: Final = 1e8
 """Longest period, so that several of them are no longer than a profile allows [us]."""
-_MOST_DEADLINE_US: Final = 1e9
+_LONGER: Final = 1.5
+"""Factor from a window to the next one that is tried."""
+_ALWAYS: Final = 0.9
+"""Least share of the log in which a periodic message comes, so that its period is that of the whole log."""
+_ROUNDED: Final = 0.005
+"""Most that the period of a message that is not periodic is rounded, as a share."""
+_MORE_JITTER: Final = 0.05
+"""Most jitter that rounding a period may add, in periods."""
 
 
 class _Timing(NamedTuple):
@@ -82,18 +104,22 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
     frames = read_can(path, channel=channel, progress=progress)
     if frames.synthetic:
         raise BusplanError(f"{name}: is {frames.synthetic}: it measures no machine, and its profile is there already")
-    stretch = longest_stretch(frames)
-    messages = frames_by_identifier(frames, stretch).values()
-    least = least_bit_rate(frames, stretch).likely
-    _require_times(stretch, messages, least, name)
+    try:
+        stretch = longest_stretch(frames)
+    except BusplanError as error:
+        raise BusplanError(f"{name}: {error}") from None
+    messages = list(frames_by_identifier(frames, stretch).values())
+    least = least_bit_rate(frames, stretch)
+    _require_times(stretch, messages, least.likely, name)
     machine = Reading("can", "CAN log", name, rank=2, lists_all=False, is_log=True)
-    length_us, error_us = float(stretch.times_us[-1] - stretch.times_us[0]), step_us(stretch)
-    timings = [_timing(sent, length_us, error_us) for sent in messages]
+    timings = _timings(messages, stretch)
     for timing in timings:
         number = timing.sent.identifier + EXTENDED * timing.sent.extended
-        machine.messages[number] = dict(_facts(timing, PurePath(name).name))
-    machine.remarks += _remarks(frames, stretch, timings, length_us)
-    _bit_rate(machine, frames, stretch, least)
+        machine.messages[number] = dict(_facts(timing, stretch, PurePath(name).name))
+    machine.remarks += _remarks(frames, stretch, timings)
+    fullest = _fullest(messages, stretch)
+    machine.bus[FULLEST] = Fact(fullest)
+    _bit_rate(machine, frames, stretch, least, fullest)
     return machine
 
 
@@ -105,50 +131,135 @@ def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_
             f"{name}: {plural(len(stretch.taken), 'frame')}, none of an identifier that comes {LEAST_EVENTS} times: "
             "too few for a plan; record for longer"
         )
-    fastest = min(often, key=lambda sent: sent.mean.value)
-    error_us = step_us(stretch)
-    if not error_us or 2 * error_us > fastest.mean.value:
+    fastest = max(often, key=lambda sent: len(sent.times_us))
+    mean_us, error_us = stretch.length_us / len(fastest.times_us), step_us(stretch)
+    if not error_us or 2 * error_us > mean_us:
         steps = f"steps of {error_us:,.0f} us" if error_us else "one time for all frames"
         raise BusplanError(
             f"{name}: its stamps have {steps}, too coarse for {fastest.identifier:#x}, which comes every "
-            f"{fastest.mean.value:,.0f} us; record with finer stamps, as `candump -l` has them"
+            f"{mean_us:,.0f} us; record with finer stamps, as `candump -l` has them"
         )
     reason = stamps_of_no_bus(least_kbit_s)
     if reason:
         raise BusplanError(f"{name}: {reason}; record the bus itself, as with `candump -l`")
 
 
-def _timing(sent: SentFrames, length_us: float, stamp_error_us: float) -> _Timing:
-    """Period, jitter and burst that hold all frames of an identifier."""
-    if sent.periods is not None:
-        period_us, error_us = sent.mean
-        doubt = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
-        period_us = _roundest(period_us, doubt / 2)
-    else:
-        # A frame more may lie in a log of this length.
-        doubt, period_us = None, min(max(floor(length_us / (len(sent.times_us) + 1)), _LEAST_US), _MOST_US)
-    stamp_error_us = stamp_error_us if len(sent.times_us) > 1 else 0.0
-    model = event_model(sent.times_us, period_us, stamp_error_us=stamp_error_us, tolerance=float(CLOCK_TOLERANCE))
-    return _Timing(sent, period_us, model, doubt)
+def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Timing]:
+    """An event model of each identifier that allows all its frames, with little more load than the fullest second.
+
+    A periodic message has its period. Any other one has the rate and the burst of its arrival curve at a window of a
+    second. Identifiers that come at different times may so have more load than any second has: then the window grows,
+    for rates fall with it as bursts grow, until the load is `MOST_OF_FULLEST` of the fullest second, or bursts
+    would have grown by more frames than that has.
+    """
+    longest_us = [_longest_us(sent) for sent in messages]
+    most = MOST_OF_FULLEST * fullest_load(*_wire_us(messages, longest_us))
+    window_us, share = WINDOW_US, 1.0
+    rows = [sent.periods is not None for sent in messages]
+    before: list[_Timing] = []
+    most_at_once_us = 0.0
+    while True:
+        timings = [
+            _periodic(sent, stretch) if is_row else _steady(sent, stretch, window_us, share)
+            for sent, is_row in zip(messages, rows, strict=True)
+        ]
+        loads = [us / timing.period_us for us, timing in zip(longest_us, timings, strict=True)]
+        at_once_us = sum(us * timing.model.burst for us, timing in zip(longest_us, timings, strict=True))
+        most_at_once_us = most_at_once_us or at_once_us + most / MOST_OF_FULLEST * WINDOW_US
+        if at_once_us > most_at_once_us:
+            return before
+        if sum(loads) <= most or share < 1:
+            return timings
+        before = timings
+        if window_us == WINDOW_US:
+            rows = [is_row and _is_always(sent, stretch) for sent, is_row in zip(messages, rows, strict=True)]
+        if window_us > stretch.length_us:
+            periodic = sum(load for load, is_row in zip(loads, rows, strict=True) if is_row)
+            share = max((most * (1 - _ROUNDED) - periodic) / max(sum(loads) - periodic, 1e-9), 0.1)
+            share = min(share, 1 - _ROUNDED)
+        window_us *= _LONGER
 
 
-def _roundest(value: float, doubt: float) -> float:
-    """The number with the fewest digits that lies no further from a value than its doubt.
+def _is_always(sent: SentFrames, stretch: ClockStretch) -> bool:
+    """Whether a periodic message comes nearly all the time of the log."""
+    return float(sent.times_us[-1] - sent.times_us[0]) + sent.mean.value >= _ALWAYS * stretch.length_us
+
+
+def _longest_us(sent: SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
+    """The longest frame of an identifier, with the most stuff bits [us]."""
+    switched = max(data_bit_rate_kbit_s, bit_rate_kbit_s) if sent.switches else bit_rate_kbit_s
+    us = frame_us(
+        sent.most_bytes,
+        identifier_bits=29 if sent.extended else BASE_BITS,
+        bit_rate_kbit_s=bit_rate_kbit_s,
+        data_bit_rate_kbit_s=switched if sent.is_fd else 0.0,
+        is_stuffed=True,
+    )
+    return float(us)
+
+
+def _wire_us(messages: Sequence[SentFrames], longest_us: Sequence[float]) -> tuple[Floats, Floats]:
+    """Stamps of all frames, ascending, and their time on the wire, each as long as the longest of its identifier."""
+    times_us = np.concatenate([sent.times_us for sent in messages])
+    wire_us = np.repeat(longest_us, [len(sent.times_us) for sent in messages])
+    order = np.argsort(times_us, kind="stable")
+    return times_us[order], wire_us[order]
+
+
+def _fullest(messages: Sequence[SentFrames], stretch: ClockStretch) -> MostLoad:
+    """Load of the fullest second of the log by bit rates, and how many of its seconds have frames."""
+
+    def load(bit_rate_kbit_s: float, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
+        us = [_longest_us(sent, bit_rate_kbit_s, data_bit_rate_kbit_s) for sent in messages]
+        return fullest_load(*_wire_us(messages, us))
+
+    seconds = np.unique((stretch.times_us - stretch.times_us[0]) // WINDOW_US)
+    return MostLoad(load, len(seconds), int(seconds[-1]) + 1)
+
+
+def _periodic(sent: SentFrames, stretch: ClockStretch) -> _Timing:
+    """Period and jitter of a message that comes once a period."""
+    period_us, error_us = sent.mean
+    doubt_us = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
+    return _covering(sent, period_us, doubt_us / 2, stretch)._replace(uncertainty_us=doubt_us)
+
+
+def _steady(sent: SentFrames, stretch: ClockStretch, window_us: float, share: float) -> _Timing:
+    """Rate and burst of the other messages: no less than a share of the mean rate of the log."""
+    rate = max(steady_rate(sent.times_us, window_us), share * len(sent.times_us) / stretch.length_us)
+    period_us = min(max(1 / rate, _LEAST_US), _MOST_US)
+    return _covering(sent, period_us, _ROUNDED * period_us, stretch)
+
+
+def _covering(sent: SentFrames, period_us: float, doubt_us: float, stretch: ClockStretch) -> _Timing:
+    """A period, rounded within a doubt, with the jitter or burst that allows all frames."""
+    times_us, error_us = sent.times_us, step_us(stretch) if len(sent.times_us) > 1 else 0.0
+    least_us = float(ahead(times_us, period_us).max()) + _MORE_JITTER * period_us
+
+    def allows(rounded_us: float) -> bool:
+        return rounded_us <= period_us or float(ahead(times_us, rounded_us).max()) <= least_us
+
+    period_us = next(filter(allows, _roundings(period_us, doubt_us)), period_us)
+    return _Timing(sent, period_us, event_model(times_us, period_us, stamp_error_us=error_us, tolerance=0.0), None)
+
+
+def _roundings(value: float, doubt: float) -> Iterator[float]:
+    """Numbers no further from a value than its doubt, those with the fewest digits first; at last one just below it.
 
     Examples
     --------
-    >>> _roundest(9999.87, 0.6), _roundest(9998.04, 0.6)
-    (10000.0, 9998.0)
+    >>> next(_roundings(9999.87, 0.6)), list(_roundings(9998.74, 0.8))
+    (10000.0, [9999.0, 9998.0, 9998.7, 9998.74])
     """
     for digits in range(-floor(log10(value)) - 1, 3):
-        rounded = round(value, digits)
-        if rounded and abs(rounded - value) <= doubt:
-            return rounded
-    return round(value, 3)
+        step = 10.0**-digits
+        for rounded in dict.fromkeys((round(value, digits), round(floor(value / step) * step, 3))):
+            if rounded > 0 and abs(rounded - value) <= doubt:
+                yield rounded
 
 
-def _facts(timing: _Timing, place: str) -> Iterator[tuple[str, Fact]]:
-    sent, (burst, jitter_us) = timing.sent, timing.model
+def _facts(timing: _Timing, stretch: ClockStretch, place: str) -> Iterator[tuple[str, Fact]]:
+    sent, model = timing.sent, timing.model
     frames = plural(len(sent.times_us), "frame")
     yield "name", Fact(f"id-{sent.identifier:#x}", place)
     yield "identifier", Fact(sent.identifier + EXTENDED * sent.extended, place, "measured")
@@ -156,24 +267,16 @@ def _facts(timing: _Timing, place: str) -> Iterator[tuple[str, Fact]]:
         yield "is_fd", Fact(True, place, "measured")
         yield "switches", Fact(sent.switches, place, "measured")
     yield "payload_bytes", Fact(sent.most_bytes, place, "measured", "the most seen")
-    kind = f"U {timing.uncertainty_us:.2g} us" if timing.is_periodic else "not periodic: the mean distance"
+    kind = f"U {timing.uncertainty_us:.2g} us" if timing.is_periodic else "not periodic: the most in a longer time"
     yield "period_us", Fact(timing.period_us, place, "measured", f"{frames}, {kind}")
-    if jitter_us:
-        note = "of the arrival, the wait for other frames in it" if timing.is_periodic else "the soonest after another"
-        yield "jitter_us", Fact(jitter_us, place, "measured", note)
-    if burst > 1:
-        yield "burst", Fact(burst, place, "measured", "so many come together")
-        deadline_us, note = burst * timing.period_us, "the time in which so many more come"
-    else:
-        deadline_us, note = timing.period_us + jitter_us, "a period after the latest start"
-    if burst > 1 or (jitter_us and not timing.is_periodic):
-        yield "deadline_us", Fact(min(deadline_us, _MOST_DEADLINE_US), place, "derived", note)
+    yield from timing_facts(model, timing.period_us, place, is_periodic=timing.is_periodic)
+    yield SENT, Fact((sent.times_us, step_us(stretch)))
 
 
-def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing], length_us: float) -> Iterator[str]:
+def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing]) -> Iterator[str]:
     yield from faults(frames, stretch)
     number = plural(len(stretch.taken), "frame")
-    yield f"The log has {number} of {plural(len(timings), 'identifier')} in {length_us / 1e6:.3g} s"
+    yield f"The log has {number} of {plural(len(timings), 'identifier')} in {stretch.length_us / 1e6:.3g} s"
     if frames.errors:
         yield f"{plural(frames.errors, 'error frame')}: in no load"
     if frames.remote:
@@ -190,22 +293,26 @@ def _names(timings: Iterable[_Timing]) -> str:
     return first_of([f"{timing.sent.identifier:#x}" for timing in timings], LISTED)
 
 
-def _bit_rate(machine: Reading, frames: CanFrames, stretch: ClockStretch, least_kbit_s: float) -> None:
-    """The bit rate that frames directly after each other show, or the least usual one that the log allows."""
-    if not least_kbit_s:
-        return
-    machine.bus[LEAST] = Fact(least_kbit_s)
+def _bit_rate(
+    machine: Reading, frames: CanFrames, stretch: ClockStretch, least: LeastBitRate, fullest: MostLoad
+) -> None:
+    """The bit rate that frames directly after each other show; where they show none, the question for it."""
+    machine.bus[LEAST] = Fact(least)
     bits, apart_us = frames.bits[stretch.taken][1:], np.diff(stretch.times_us)
     rates = 1000 * bits / np.maximum(apart_us, 1e-3)
-    allowed = [rate for rate in _BIT_RATES if rate >= least_kbit_s]
-    shown = [rate for rate in allowed if _is_shown(rate, rates)]
-    why = f"no less than {least_kbit_s:.3g} kbit/s by the log, for frames do not overlap"
+    possible = [rate for rate in _BIT_RATES if rate >= least.surely]
+    shown = [rate for rate in possible if _is_shown(rate, rates)]
     if shown:
-        why = f"{shown[0]:g} kbit/s by frames of the log directly after each other"
-        machine.bus[BIT_RATE] = machine.bus[SHOWN] = assumed(shown[0], "by frames of the log directly after each other")
-    else:
-        machine.bus[BIT_RATE] = assumed(allowed[0], f"the least usual one that is {why}")
-    machine.remarks.append(f"The bit rate is {why}")
+        by = "by frames of the log directly after each other"
+        machine.bus[BIT_RATE] = machine.bus[SHOWN] = assumed(shown[0], by)
+        machine.remarks.append(f"The bit rate is {shown[0]:g} kbit/s {by}")
+        return
+    loads = [(rate, fullest.load(rate)) for rate in possible]
+    listed = [f"{100 * load:.2g} % at {rate:g}" for rate, load in loads if load <= 1]
+    machine.bus[ASK] = Fact(
+        f"{machine.file}: does not show the bit rate of its bus, and all times follow from it; give --bit-rate RATE, "
+        f"in kbit/s. The load of its fullest second is {', '.join(listed) or 'over 100 % at any'}"
+    )
 
 
 def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:
