@@ -84,12 +84,12 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
     from busplan.buses.figure import AXES, NODES
     from busplan.forms.blocks import Code, Report, Sentence, Table, TableColumn, TableRow, count_value
     from busplan.forms.numbers import period
+    from busplan.questions.base.inputs import load_network
     from busplan.questions.base.sentences import document
-    from busplan.questions.fit.network import network_of
 
     records, rows = [], []
     for profile in profiles:
-        network, groups = network_of(profile), profile.node_groups
+        network, groups = load_network(profile), profile.node_groups
         nodes, axes = sum(group.nodes for group in groups), sum(group.nodes * group.node.axes for group in groups)
         description = " ".join(profile.description.split())
         period_us: Any = profile.cycle.period_us if profile.has_cycle else None

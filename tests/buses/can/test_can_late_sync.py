@@ -67,7 +67,9 @@ def test_other_messages_meet_the_next_sync_sooner(tmp_path: Path) -> None:
     text = PLAN.replace("nodes = 4", "nodes = 3").replace("base_us = 100", "base_us = 0")
     path.write_text(text.replace("host_us = 100", "host_us = 0") + message)
     punctual, late = (
-        responses(busplan.load_profile(path, changes={"bus.sync_jitter_us": us, "cycle.period_us": 790}))
+        dict[str, Any](
+            responses(busplan.load_profile(path, changes={"bus.sync_jitter_us": us, "cycle.period_us": 790}))
+        )
         for us in (0, 20)
     )
     assert late["SYNC"] == punctual["SYNC"] + 20

@@ -206,7 +206,7 @@ def test_uarts_at_the_end_of_their_tolerance_stay_within_u(protocol: str, share:
 
 @pytest.mark.parametrize("protocol", ["modbus-rtu", "dynamixel-2", "feetech"])
 def test_a_longest_turn_around_counts_once(protocol: str) -> None:
-    more = {"bus__max_turn_bits": 100.0, "bus__clock_tolerance": 0.0, "node__execution__grade": "measured"}
+    more: Any = {"bus__max_turn_bits": 100.0, "bus__clock_tolerance": 0.0, "node__execution__grade": "measured"}
     if protocol == "modbus-rtu":
         profile = modbus(**more)
         shortest_us, longest_us = (

@@ -125,7 +125,7 @@ def test_what_is_not_given_and_makes_a_plan_worse_is_said(kind: str, variant: st
 @pytest.mark.parametrize("period_us", [3000.0, 5000.0, 8000.0, 12_000.0, 20_000.0])
 def test_a_verdict_on_a_guess_holds_at_twice_the_guess(kind: str, period_us: float) -> None:
     profile = busplan.load_profile(new_profile(kind, ""), changes={"cycle.period_us": period_us, "limits.reserve": 0.0})
-    execution = profile.node.execution
+    execution: Any = profile.node_groups[0].node.execution
     names = ("time_us",) if execution.kind == "table" else ("base_us", "per_byte_us")
     values = {f"node.execution.{name}": getattr(execution, name) for name in names}
     twice = {key: [2 * one for one in us] if isinstance(us, tuple) else 2 * us for key, us in values.items()}

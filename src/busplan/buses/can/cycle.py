@@ -508,7 +508,7 @@ class CanCycle(BusCycle):
             due = "without a deadline" if latest.deadline_us == NO_DEADLINE_US else f"of {_short(latest.deadline_us)}"
             response = f"{_short(worst.us)} us {due}"
             words = response if worst.us < inf else "without a worst-case response time"
-            free = sum(message.deadline_us == NO_DEADLINE_US for message in self._messages)
+            free = sum(message.deadline_us == NO_DEADLINE_US for message, _ in answers)
             others = f"; {plural(free, 'message')} without a deadline" if free and "without" not in words else ""
             lines.append(("latest message", f"{latest.name}, {words}{others}"))
         possible_us = plain(self.possible_us())

@@ -1,7 +1,7 @@
 """`busplan.import_profile`: a machine from the files that its engineers already have."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any, Final
@@ -161,17 +161,7 @@ def import_profile(
     none = progress or (lambda _done, _total: None)
     numbers = () if nodes is None else node_ids(nodes)
     readings = [read_machine(each, bus=bus, channel=channel, nodes=numbers, progress=none) for each in names]
-    described = [reading.file for reading in readings if reading.nodes and reading.kind == "can"]
-    if nodes is not None and len(described) != 1:
-        found = f"{described[0]} and {described[1]} are both" if described else "none of the files is"
-        raise BusplanError(f"nodes: {found} an EDS; it says of which nodes one EDS is")
-    logs = [reading.file for reading in readings if reading.is_log]
-    if channel is not None and not logs:
-        raise BusplanError(f"channel {channel}: none of the files is a CAN log")
-    if bus is not None and not any(reading.is_database for reading in readings):
-        raise BusplanError(f"bus {bus}: none of the files is a database of messages")
-    if len(logs) > 1:
-        raise BusplanError(f"{logs[0]} and {logs[1]} are both logs; give the longer one")
+    _require_files(readings, bus=bus, channel=channel, has_nodes=nodes is not None)
     can.settle(readings)
     machine = merged(readings)
     if period_us is not None:
@@ -193,6 +183,21 @@ def import_profile(
     if can.FULLEST in machine.bus:
         machine.remarks.append(_load_words(profile, machine.bus[can.FULLEST].value))
     return ImportAnswer(profile, text, tuple(rows), tuple(machine.remarks))
+
+
+def _require_files(readings: Sequence[Reading], *, bus: str | None, channel: str | None, has_nodes: bool) -> None:
+    """Refuse options that no file answers to, and two logs."""
+    described = [reading.file for reading in readings if reading.nodes and reading.kind == "can"]
+    if has_nodes and len(described) != 1:
+        found = f"{described[0]} and {described[1]} are both" if described else "none of the files is"
+        raise BusplanError(f"nodes: {found} an EDS; it says of which nodes one EDS is")
+    logs = [reading.file for reading in readings if reading.is_log]
+    if channel is not None and not logs:
+        raise BusplanError(f"channel {channel}: none of the files is a CAN log")
+    if bus is not None and not any(reading.is_database for reading in readings):
+        raise BusplanError(f"bus {bus}: none of the files is a database of messages")
+    if len(logs) > 1:
+        raise BusplanError(f"{logs[0]} and {logs[1]} are both logs; give the longer one")
 
 
 def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
