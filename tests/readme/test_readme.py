@@ -11,7 +11,6 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 import pytest
 from pydantic import BaseModel
-from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
 import busplan
@@ -157,10 +156,10 @@ def reference_row(model: type[BaseModel], name: str, key: str) -> str:
     values = allowed(properties(model)[name])
     if key == "bus.nodes":
         values = f"{values}, required without groups"
-    elif field.default is PydanticUndefined:
+    elif field.is_required():
         values = f"{values}, required"
-    elif field.default is not None:
-        values = f"{values} ({json.dumps(field.default)})"
+    elif (default := field.get_default(call_default_factory=True)) is not None:
+        values = f"{values} ({json.dumps(default)})"
     meaning = re.sub(r" \[[^]]*\]$", "", field.description or "")
     return f"| `{key}` | {values} | {meaning} |"
 
