@@ -22,7 +22,7 @@ from busplan.forms.blocks import (
     attribute_value,
 )
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     Models,
     ProfileLike,
     checked_models,

@@ -24,7 +24,7 @@ from busplan.questions.fit.figures import (
     figures,
     limits_behind,
 )
-from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
+from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.network import changed
 from busplan.questions.plan.search import (
     NODES,
