@@ -4,8 +4,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Final
 
 from busplan.buses.rule import RecordedFigure, RecordedVerdict

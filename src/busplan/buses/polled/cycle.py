@@ -8,7 +8,7 @@ from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
-from busplan.buses.polled.protocols import BUFFERED, Protocol, Requests, Times, c, protocol_of, times
+from busplan.buses.polled.protocols import Protocol, Requests, Times, c, protocol_of, times
 from busplan.elementwise import Number, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
@@ -174,7 +174,7 @@ class PolledCycle(BusCycle):
 
     def _execution_us(self, kind: str, group: Group) -> Number:
         """Own time of a node before it answers; 0 where it answers from a buffer [us]."""
-        if self.network.profile.bus.protocol in BUFFERED:
+        if self._protocol.is_buffered:
             return 0.0
         read_us, write_us = group.read_execution_us, group.write_execution_us
         own_us = {"read": read_us, "write": write_us}.get(kind)
@@ -255,7 +255,7 @@ class PolledCycle(BusCycle):
                 "bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * c["SHARES[ADAPTER_SHARE]"]
             ),
         ]
-        if self.network.profile.bus.protocol not in BUFFERED:
+        if not self._protocol.is_buffered:
             for group in groups:
                 reads, writes = self._answers(group, "read"), self._answers(group, "write")
                 us = reads * group.read_uncertainty_us + writes * group.write_uncertainty_us
@@ -270,15 +270,13 @@ class PolledCycle(BusCycle):
         bus = self.network.profile.bus
         parts = (
             (bus.host_us, LeftOut("host time", "bus.host_us")),
-            (bus.adapter_us or bus.protocol in BUFFERED, LeftOut("the host's adapter", "bus.adapter_us")),
+            (bus.adapter_us or self._protocol.is_buffered, LeftOut("the host's adapter", "bus.adapter_us")),
         )
         return tuple(left_out for given, left_out in parts if not given)
 
     def premises(self) -> tuple[str, ...]:
-        """What no key gives."""
-        if self.network.profile.bus.protocol == "dynamixel-2":
-            return ("no byte of the data is stuffed (at most one in three would be)",)
-        return ()
+        """What the protocol's figures suppose."""
+        return tuple(self._protocol.premises)
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate."""

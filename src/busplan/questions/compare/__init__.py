@@ -15,7 +15,13 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.arguments import ProfileLike, load_profile, one_or_several, require_cycle, with_its_constants
+from busplan.questions.base.arguments import (
+    ProfileLike,
+    load_profile,
+    one_or_several,
+    require_cycle,
+    with_its_constants,
+)
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
 from busplan.questions.fit.graded import assumed_rates, given
