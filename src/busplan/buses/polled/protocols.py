@@ -70,7 +70,7 @@ class Protocol(NamedTuple):
     @property
     def requests(self) -> tuple[Requests, ...]:
         """The ways to ask that it has, the fastest first."""
-        ways: dict[Requests, float] = {
+        ways: dict[Requests, Number] = {
             "exchange": self.exchange_request_bytes,
             "sync": self.sync_read_bytes,
             "single": self.read_request_bytes,

@@ -113,7 +113,7 @@ class PolledBus(BusSection):
     clock_tolerance: Tolerance | None = Field(
         default=None,
         description="How much longer or shorter than they should be all bits may be, a share 0..0.05: a doubt of the "
-        "cycle; 0 for exact clocks. Without it the protocol's: 0.01 of modbus-rtu, else 0.005, assumed",
+        "cycle; 0 for exact clocks. Without it the protocol's; where that says nothing 0.005, assumed",
         examples=[0.0001],
     )
     adapter_us: TimeUs = Field(
