@@ -473,7 +473,6 @@ def test_a_table_is_a_protocol(tmp_path: Path) -> None:
     run("init", "machine.toml", "--bus", "Invented 3", "--nodes", "6", "--axes", "6")
     assert 'protocol = "invented-3"' in (tmp_path / "machine.toml").read_text(encoding="utf-8")
     assert "machine  Invented 3, 6 nodes" in run("capacity", "machine.toml", "--set", "cycle.period_us=100000")
-    assert "bus.bit_rate_kbit_s = 500" in run("plan", "machine.toml", "--free", "bit_rate")
 
 
 def test_usual_bit_rates_have_a_grade_and_a_source_and_are_ones_of_the_protocol() -> None:

@@ -8,7 +8,7 @@ from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
-from busplan.buses.polled.protocols import Protocol, Requests, Times, c, protocol_of, times
+from busplan.buses.polled.protocols import ProtocolFigures, Requests, Times, c, protocol_of, times
 from busplan.elementwise import Number, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
@@ -92,7 +92,7 @@ class PolledCycle(BusCycle):
         self.is_typical = model == TYPICAL
 
     @property
-    def _protocol(self) -> Protocol:
+    def _protocol(self) -> ProtocolFigures:
         return protocol_of(self.network.profile.bus)
 
     @cached_property

@@ -27,7 +27,7 @@ UNLIMITED_KBIT_S: Final = 1e9
 Requests = Literal["exchange", "sync", "single"]
 
 
-class Protocol(NamedTuple):
+class ProtocolFigures(NamedTuple):
     """A serial protocol; a size is without data, 0 for no such telegram. The numbers may be of any sort."""
 
     bits_per_byte: Number
@@ -89,17 +89,17 @@ class Protocol(NamedTuple):
 
 
 @cached(maxsize=16)
-def _shipped(name: str) -> Protocol:
+def _shipped(name: str) -> ProtocolFigures:
     """A protocol of the constants, whose values keep their sources."""
     table = PROTOCOLS[name]
     values: Any = {key.lower(): value for key, value in c.by_key(table).items()} | c.beside[table]
-    known = {key: values[key] for key in Protocol._fields if key in values}
-    return Protocol(**{"clock_tolerance": c["SHARES[CLOCK_TOLERANCE]"], **known})
+    known = {key: values[key] for key in ProtocolFigures._fields if key in values}
+    return ProtocolFigures(**{"clock_tolerance": c["SHARES[CLOCK_TOLERANCE]"], **known})
 
 
-def protocol_of(bus: Any) -> Protocol:
+def protocol_of(bus: Any) -> ProtocolFigures:
     """The protocol of a section [bus]."""
-    return _shipped(bus.protocol) if isinstance(bus.protocol, str) else Protocol(**vars(bus.protocol))
+    return _shipped(bus.protocol) if isinstance(bus.protocol, str) else ProtocolFigures(**vars(bus.protocol))
 
 
 class Times(NamedTuple):
