@@ -61,7 +61,7 @@ __all__ = [
 if TYPE_CHECKING:
     from busplan.errors import BusplanError
     from busplan.gate.check import CheckAnswer, check
-    from busplan.questions.base.inputs import load_profile
+    from busplan.questions.base.arguments import load_profile
     from busplan.questions.calibrate import CalibrateAnswer, calibrate
     from busplan.questions.capacity import CapacityAnswer, capacity
     from busplan.questions.circle import CircleTestAnswer, circle_test
@@ -86,7 +86,7 @@ else:
     _HOMES = {
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",
-        "load_profile": "busplan.questions.base.inputs",
+        "load_profile": "busplan.questions.base.arguments",
         "check": "busplan.gate.check",
         "CheckAnswer": "busplan.gate.check",
         "import_profile": "busplan.questions.import_",

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache, wraps
@@ -166,6 +166,8 @@ class Constants(Mapping[str, Sourced]):
         The package that the files lie in; without it there are no constants.
     names
         Names of the files; `constants.toml` without any.
+    beside
+        Words of a table that are of no constant; `beside` has them, by the table's name.
 
     Examples
     --------
@@ -174,7 +176,7 @@ class Constants(Mapping[str, Sourced]):
     (16.0, 'paper, section I; IEEE project page', 'DATA_RATE_MBIT_S[S100]')
     """
 
-    def __init__(self, package: str = "", *names: str) -> None:
+    def __init__(self, package: str = "", *names: str, beside: Collection[str] = ()) -> None:
         with _LOCK:
             _ALL.append(self)
         self.fixed: dict[str, str] = {}
@@ -183,8 +185,13 @@ class Constants(Mapping[str, Sourced]):
         self._formulas: dict[str, Callable[[Any], float]] = {}
         self._versions: dict[ChangedConstants, dict[str, Sourced]] = {}
         self._tables: dict[tuple[ChangedConstants, str], Mapping[str, Sourced]] = {}
+        self.beside: dict[str, dict[str, Any]] = {}
         for file in (names or ("constants.toml",)) if package else ():
-            for name, words in _entries("", read_toml(package, file)):
+            tables = read_toml(package, file)
+            for name, table in tables.items() if beside else ():
+                if found := {word: table.pop(word) for word in beside if word in table}:
+                    self.beside[name] = found
+            for name, words in _entries("", tables):
                 if why := words.pop("fixed", ""):
                     self.fixed[name] = why
                 self._own[name] = Sourced(**{"value": nan, **words}, name=name)

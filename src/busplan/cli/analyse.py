@@ -299,7 +299,7 @@ def explain_command(
         right ones. [default: all]
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.questions.base.inputs import checked_models, load_network
+        from busplan.questions.base.arguments import checked_models, load_network
         from busplan.questions.explain import explain
 
         loaded = load_changed(profile, changes)

@@ -84,7 +84,7 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
     from busplan.buses.figure import AXES, NODES
     from busplan.forms.blocks import Code, Report, Sentence, Table, TableColumn, TableRow, count_value
     from busplan.forms.numbers import period
-    from busplan.questions.base.inputs import load_network
+    from busplan.questions.base.arguments import load_network
     from busplan.questions.base.sentences import document
 
     records, rows = [], []

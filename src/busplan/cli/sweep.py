@@ -95,7 +95,7 @@ def sweep_command(
             refuse_terminal("parquet")
         require_pyarrow("--format parquet" if format_ else f"--output {output}")
     require_apart({"--output": output}, inputs=profile_files(profile))
-    from busplan.questions.base.inputs import load_network
+    from busplan.questions.base.arguments import load_network
     from busplan.questions.sweep import checked_sweep, computed
 
     loaded, varied = load_changed(profile, changes), parse_axes(vary or [])

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
-from pathlib import Path as FilePath
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -21,7 +21,7 @@ from busplan.profile.document import Document
 from busplan.profile.edit import profile_text
 from busplan.profile.sources import Collection, ProfileSource, collect
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
+from busplan.questions.base.arguments import FilePath, ProfileLike, argument, items, key_changes
 from busplan.sections.profile import Profile
 from busplan.sourced import changed_constants, constants_changed
 
@@ -65,7 +65,7 @@ def check(
     baseline: str | os.PathLike[str] | Baseline | None = None,
     pass_on_unmatched: bool = False,
     record: bool = False,
-    recording: Path | None = None,
+    recording: FilePath | None = None,
     quantile: float = 1.0,
     skip_others: bool = False,
     select: Sequence[str] = (),
@@ -175,7 +175,7 @@ def check(
 
 
 def _record_name(file: ProfileSource | Document, recorded: Baseline | None) -> str:
-    source = ProfileSource(FilePath(file.name), file.name) if isinstance(file, Document) else file
+    source = ProfileSource(Path(file.name), file.name) if isinstance(file, Document) else file
     return source.name if recorded is None else recorded.name_of(source)
 
 
@@ -198,7 +198,7 @@ def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool)
 
 
 def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Baseline:
-    recorded = baseline if isinstance(baseline, Baseline) else load_baseline(FilePath(baseline))
+    recorded = baseline if isinstance(baseline, Baseline) else load_baseline(Path(baseline))
     if not recorded.is_current:
         raise BusplanError(
             f"{recorded}: recorded by other timing models, so its figures cannot be compared; record it again with "

@@ -20,7 +20,7 @@ from busplan.gate.rules import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import LoadedProfile, Spot
 from busplan.profile.edit import short_text
-from busplan.questions.base.inputs import Path
+from busplan.questions.base.arguments import FilePath
 from busplan.questions.fit.certainty import available_us, fits_in
 from busplan.questions.fit.circle_setup import path_steps, refusals
 from busplan.questions.fit.cure import changeable, cure
@@ -237,7 +237,7 @@ _UNPLANNED: Final = "name"
 class Recording(NamedTuple):
     """A recording of the machine that a profile describes."""
 
-    path: Path
+    path: FilePath
     quantile: float = 1.0
     """Share of the events that a recorded worst case covers, 0.5..1."""
 

@@ -24,7 +24,7 @@ from busplan.forms.blocks import (
 from busplan.questions.base.sentences import document, fields
 from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME
 from busplan.questions.fit.figures import limits_behind
-from busplan.questions.fit.inputs import heavy_assumptions
+from busplan.questions.fit.graded import heavy_assumptions
 from busplan.questions.fit.needs import missed_limits
 from busplan.sections.cycle import TableExecution
 

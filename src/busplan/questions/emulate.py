@@ -17,7 +17,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Code, Report, Sentence
 from busplan.progress import ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, finite, load_network, whole, with_its_constants
+from busplan.questions.base.arguments import ProfileLike, finite, load_network, whole, with_its_constants
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
@@ -26,7 +26,7 @@ _CYCLES = 1000
 """Cycles of a recording by default."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, repr=False)
 class EmulateAnswer(Answer):
     """Answer of `emulate`: a synthetic recording, which `save` writes.
 
@@ -58,7 +58,7 @@ class EmulateAnswer(Answer):
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         recordings = dict.fromkeys(emulator_of(self.profile).endings, lambda: self.content)
-        return {**Answer._contents(self), **recordings}  # noqa: SLF001 - super() knows no class with slots made anew
+        return {**super()._contents(), **recordings}
 
     def report(self) -> Report:
         """What is in the recording."""
@@ -156,7 +156,7 @@ def emulator_of(profile: Profile) -> Emulator:
     Raises
     ------
     BusplanError
-        Nothing.
+        No recording of that kind of bus is emulated.
     """
     emulator = bus_of(profile).emulator()
     if emulator is None:

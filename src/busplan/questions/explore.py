@@ -14,7 +14,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Explorer, JsonDocument, Record, Report, Sentence, Slider
 from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_network, require_cycle, with_its_constants
+from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.capacity.verdict import card, verdict_of
 from busplan.questions.fit.figures import capacity_figures

@@ -25,7 +25,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import known_text
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     Models,
     ProfileLike,
     checked_models,

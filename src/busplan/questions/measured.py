@@ -4,8 +4,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path as FilePath
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Final
 
 from busplan.buses.rule import RecordedFigure, RecordedVerdict
@@ -30,7 +29,7 @@ from busplan.forms.blocks import (
 from busplan.profile.edit import value_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, ProfileLike, finite, load_profile, with_its_constants
+from busplan.questions.base.arguments import FilePath, ProfileLike, finite, load_profile, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
@@ -134,7 +133,7 @@ class MeasuredAnswer(Answer):
 @with_its_constants
 def measured(
     profile: ProfileLike,
-    recording: Path,
+    recording: FilePath,
     *,
     quantile: float = 1.0,
     channel: str | None = None,
@@ -183,7 +182,7 @@ def measured(
         raise BusplanError(f"{source}: a recording is read from a file")
     recorded = bus_of(plan).recorded(
         network_of(plan),
-        FilePath(source),
+        Path(source),
         share=share,
         channel=channel,
         progress=progress or (lambda _done, _total: None),

@@ -1,8 +1,12 @@
 """Polled buses beside an event simulation, published figures, and what a user may get wrong."""
 
+import os
+import shutil
+import subprocess
+import sys
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given
@@ -11,9 +15,11 @@ from typer.testing import CliRunner
 
 import busplan
 from busplan import BusplanError, Profile
+from busplan.buses import kind_named
 from busplan.buses.polled.cycle import PolledCycle
 from busplan.cli import app
 from busplan.questions.fit.network import network_of
+from busplan.sourced import Grade
 from tests.oracles.polled_simulation import DYNAMIXEL, FEETECH, RATIOS, modbus_us, profibus_us, servos_us
 
 OWN = """\
@@ -431,3 +437,48 @@ def test_each_protocol_names_what_tests_it_and_no_other() -> None:
         if row["kind"] == "polled"
     )
     assert on_profibus == []
+
+
+INVENTED = """
+[INVENTED]
+name = "invented-3"
+called = ["Invented 3", "Invented"]
+rates = { kbit_s = [250, 500], grade = "assumed", source = "chosen" }
+grade = "assumed"
+source = "chosen"
+unit = "bytes"
+meaning = "a telegram"
+start = "bit_rate_kbit_s = 250   # assumed"
+BITS_PER_BYTE = { value = 10 }
+READ_REQUEST_BYTES = { value = 6 }
+READ_ANSWER_BYTES = { value = 5 }
+WRITE_REQUEST_BYTES = { value = 6 }
+"""
+
+
+def test_a_table_is_a_protocol(tmp_path: Path) -> None:
+    shutil.copytree(
+        Path(busplan.__file__).parent, tmp_path / "busplan", ignore=shutil.ignore_patterns("__pycache__", "*.html")
+    )
+    with (tmp_path / "busplan/buses/polled/constants.toml").open("a", encoding="utf-8") as file:
+        file.write(INVENTED)
+
+    def run(*words: str) -> str:
+        command = [sys.executable, "-m", "busplan", *words]
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    run("init", "machine.toml", "--bus", "Invented 3", "--nodes", "6", "--axes", "6")
+    assert 'protocol = "invented-3"' in (tmp_path / "machine.toml").read_text(encoding="utf-8")
+    assert "machine  Invented 3, 6 nodes" in run("capacity", "machine.toml", "--set", "cycle.period_us=100000")
+
+
+def test_usual_bit_rates_have_a_grade_and_a_source_and_are_ones_of_the_protocol() -> None:
+    constants = kind_named("polled").constants
+    for table, words in constants.beside.items():
+        rates = words["rates"]
+        assert rates["grade"] in get_args(Grade)
+        assert rates["source"]
+        assert max(rates["kbit_s"]) <= constants.by_key(table).get("MAX_BIT_RATE_KBIT_S", 1e9), table

@@ -8,7 +8,7 @@ from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
-from busplan.buses.polled.protocols import BUFFERED, Protocol, Requests, Times, c, protocol_of, times
+from busplan.buses.polled.protocols import ProtocolFigures, Requests, Times, c, protocol_of, times
 from busplan.elementwise import Number, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 from busplan.sections.cycle import time_uncertainty_us
@@ -89,7 +89,7 @@ PREMISES: Final = (
     Premise("bus.max_turn_bits", "answers as the protocol says"),
     Premise("bus.reads", "one read a node", 2),
     Premise("bus.writes", "one write a node", 2),
-    Premise("", "no stuffed bytes", applies=lambda cycle: cycle.network.profile.bus.protocol == "dynamixel-2"),
+    Premise("", "no stuffed bytes", applies=lambda cycle: protocol_of(cycle.network.profile.bus).is_stuffed),
 )
 
 
@@ -105,7 +105,7 @@ class PolledCycle(BusCycle):
         self.is_typical = model == TYPICAL
 
     @property
-    def _protocol(self) -> Protocol:
+    def _protocol(self) -> ProtocolFigures:
         return protocol_of(self.network.profile.bus)
 
     @cached_property
@@ -187,7 +187,7 @@ class PolledCycle(BusCycle):
 
     def _execution_us(self, kind: str, group: Group) -> Number:
         """Own time of a node before it answers; 0 where it answers from a buffer [us]."""
-        if self.network.profile.bus.protocol in BUFFERED:
+        if self._protocol.is_buffered:
             return 0.0
         read_us, write_us = group.read_execution_us, group.write_execution_us
         own_us = {"read": read_us, "write": write_us}.get(kind)
@@ -270,7 +270,7 @@ class PolledCycle(BusCycle):
         ]
         host_us: Number = time_uncertainty_us(self.network.profile.bus.host_us, is_guess=False)
         doubts.append(Doubt("bus.host_us", "the host's own time", host_us))
-        if self.network.profile.bus.protocol not in BUFFERED:
+        if not self._protocol.is_buffered:
             execution_us: list[Number] = []
             for group in groups:
                 reads, writes = self._answers(group, "read"), self._answers(group, "write")

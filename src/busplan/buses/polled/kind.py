@@ -19,17 +19,8 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
-from busplan.buses.polled.protocols import BUFFERED, c, protocol_of
+from busplan.buses.polled.protocols import c, protocol_of
 from busplan.elementwise import Number, larger, plain
-
-_RATES_KBIT_S: Final = {
-    "profibus-dp": (9.6, 19.2, 45.45, 93.75, 187.5, 500, 1500, 3000, 6000, 12_000),
-    "modbus-rtu": (9.6, 19.2, 38.4, 57.6, 115.2),
-    "dynamixel-2": (9.6, 57.6, 115.2, 1000, 2000, 3000, 4000, 4500),
-    "feetech": (38.4, 57.6, 76.8, 115.2, 128, 250, 500, 1000),
-    "worldfip": (31.25, 1000, 2500, 5000),
-}
-"""Usual bit rates of each protocol, for plans."""
 
 
 def _largest_bytes(network: Network) -> Number:
@@ -69,33 +60,11 @@ LIMITS: Final = (
 )
 
 
-def _section(protocol: str, rate: str, *more: str) -> str:
-    return "\n".join(
-        ("[bus]", 'kind = "polled"', f'protocol = "{protocol}"', f"bit_rate_kbit_s = {rate}   # assumed", *more)
-    )
-
-
-_SERVO: Final = (
-    "return_delay_us = 0        # assumed: set it in every servo; a new one has 500",
-    "adapter_us = 1000          # assumed: latency timer of a USB adapter, 1 to 16 ms; measure it",
-)
-_PROFIBUS: Final = _section("profibus-dp", "12000", "global_control = true      # assumed: isochronous drives")
 _SECTIONS: Final = {
-    "profibus": _PROFIBUS,
-    "modbus": _section("modbus-rtu", "115.2", "adapter_us = 1000          # assumed: measure it"),
-    "dynamixel": _section("dynamixel-2", "1000", *_SERVO),
-    "feetech": _section("feetech", "1000", *_SERVO),
-    "worldfip": _section("worldfip", "2500"),
+    table.lower(): f'[bus]\nkind = "polled"\nprotocol = "{words["name"]}"\n{words["start"]}'
+    for table, words in c.beside.items()
 }
-
-
-_TITLES: Final = {
-    "profibus-dp": "PROFIBUS DP",
-    "modbus-rtu": "Modbus RTU",
-    "dynamixel-2": "Dynamixel 2",
-    "feetech": "Feetech",
-    "worldfip": "WorldFIP",
-}
+"""Section [bus] of a new profile, by what `init` calls it."""
 
 
 class Polled(Bus):
@@ -103,17 +72,7 @@ class Polled(Bus):
 
     kind = "polled"
     title = "polled bus"
-    also_called = (
-        "PROFIBUS",
-        "PROFIBUS DP",
-        "Modbus",
-        "Modbus RTU",
-        "Dynamixel",
-        "Dynamixel 2",
-        "Feetech",
-        "WorldFIP",
-        "FIP",
-    )
+    also_called = tuple(name for words in c.beside.values() for name in words["called"])
     timing_models = (
         TimingModel(STANDARD, "answers midway between typical and longest; U reaches to both"),
         TimingModel(TYPICAL, "answers as typical nodes give them, as vendors' rules count"),
@@ -121,7 +80,7 @@ class Polled(Bus):
     figures = FIGURES
     limits = LIMITS
     starter = Starter(
-        _PROFIBUS,
+        _SECTIONS["profibus"],
         variants=_SECTIONS,
         period="10ms",
         measure="from the end of a request to the answer, less bus.return_delay_us",
@@ -146,12 +105,11 @@ class Polled(Bus):
 
     def title_of(self, network: Network) -> str:
         """Name of the protocol; of one of the user's own, that of the kind."""
-        protocol = network.profile.bus.protocol
-        return _TITLES.get(protocol, self.title) if isinstance(protocol, str) else self.title
+        return next(iter(protocol_of(network.profile.bus).called), self.title)
 
     def evidence_for(self, network: Network) -> tuple[str, ...]:
         """The measured rates are of servos of one protocol."""
-        return self.evidence_data if network.profile.bus.protocol == "dynamixel-2" else ()
+        return tuple(protocol_of(network.profile.bus).evidence)
 
     def cycle(self, network: Network, *, model: str) -> PolledCycle:
         """The cycle of a network under a timing model."""
@@ -159,16 +117,17 @@ class Polled(Bus):
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - as the cycle
         """Nodes that answer from a buffer execute beside the telegrams."""
-        return network.profile.bus.protocol not in BUFFERED
+        return not protocol_of(network.profile.bus).is_buffered
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The return delay, another bit rate, and another way to ask."""
         bus, protocol = network.profile.bus, protocol_of(network.profile.bus)
-        rates = _RATES_KBIT_S.get(bus.protocol, ()) if isinstance(bus.protocol, str) else ()
         delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
         way = PolledCycle(network, STANDARD).way
         no_delay = ({"bus.return_delay_us": 0.0},) if delay_us else ()
-        higher = tuple({"bus.bit_rate_kbit_s": float(rate)} for rate in rates if rate > bus.bit_rate_kbit_s)
+        higher = tuple(
+            {"bus.bit_rate_kbit_s": float(rate)} for rate in protocol.rates["kbit_s"] if rate > bus.bit_rate_kbit_s
+        )
         faster = tuple({"bus.requests": other} for other in protocol.requests[: protocol.requests.index(way)][::-1])
         return (
             Setting("return_delay", "return delay", Cost.REGISTER, ("bus.return_delay_us",), no_delay),
@@ -179,9 +138,7 @@ class Polled(Bus):
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """A slower adapter, and one request more that is repeated."""
         bus = network.profile.bus
-        no_timeout = (
-            "" if bus.protocol == "profibus-dp" or bus.timeout_us is not None else "bus.timeout_us is not given"
-        )
+        no_timeout = "" if protocol_of(bus).has_token or bus.timeout_us is not None else "bus.timeout_us is not given"
         return (
             Perturbation("adapter +100 us", {"bus.adapter_us": bus.adapter_us + 100}),
             Perturbation("one retry more", {"bus.retries": bus.retries + 1}, why_not=no_timeout),

@@ -1,79 +1,76 @@
 """Protocols of polled buses: what a telegram has beside its data, and the times between telegrams."""
 
-from typing import Annotated, Any, Final, Literal, NamedTuple
-
-from pydantic import Field
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, rounded_up, total
-from busplan.sections.base import Bytes, Count, Section, TimeUs
 from busplan.sourced import Constants, cached
 
-c: Final = Constants("busplan.buses.polled")
+c: Final = Constants(
+    "busplan.buses.polled",
+    beside=(
+        *("name", "called", "rates", "start", "evidence"),
+        *("is_buffered", "is_stuffed", "has_token", "has_arbiter"),
+    ),
+)
 """Constants with a source, by their names here."""
+PROTOCOLS: Final = MappingProxyType({words["name"]: table for table, words in c.beside.items()})
+"""Table of the constants of each protocol, by its name in a profile."""
 _RATE_STEPS_KBIT_S: Final = (187.5, 500, 1500, 3000, 6000)
 """Highest bit rate of each column but the last of PROFIBUS' time ratios [kbit/s]."""
+UNLIMITED: Final = 1_000_000
+"""Nodes, and data of a telegram, of a protocol that limits neither."""
+UNLIMITED_KBIT_S: Final = 1e9
 
-ProtocolName = Literal["profibus-dp", "modbus-rtu", "dynamixel-2", "feetech", "worldfip"]
 Requests = Literal["exchange", "sync", "single"]
-BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
-Tolerance = Annotated[float, Field(ge=0, le=0.05, allow_inf_nan=False)]
 
 
-class Protocol(Section):
-    """Section [bus.protocol]: a serial protocol of the user's own; a size is without data, 0 for no such telegram."""
+class ProtocolFigures(NamedTuple):
+    """A serial protocol; a size is without data, 0 for no such telegram. The numbers may be of any sort."""
 
-    bits_per_byte: Annotated[float, Field(ge=8, le=12)] = Field(description="Bits of a byte on the wire", examples=[10])
-    word_bytes: Annotated[int, Field(ge=1, le=64)] = Field(
-        default=1,
-        description="Data of a telegram are whole words of this size, as registers of Modbus [bytes]",
-        examples=[2],
-    )
-    read_request_bytes: Bytes = Field(default=0, description="Request to read one node [bytes]", examples=[8])
-    read_answer_bytes: Bytes = Field(default=0, description="Answer to it, without its data [bytes]", examples=[6])
-    write_request_bytes: Bytes = Field(
-        default=0, description="Request to write one node, without its data [bytes]", examples=[7]
-    )
-    write_answer_bytes: Bytes = Field(
-        default=0, description="Answer to it; 0 where nodes do not answer a write [bytes]", examples=[6]
-    )
-    exchange_request_bytes: Bytes = Field(
-        default=0, description="Request that writes and reads one node, without its data [bytes]", examples=[9]
-    )
-    exchange_answer_bytes: Bytes = Field(default=0, description="Answer to it, without its data [bytes]", examples=[9])
-    sync_read_bytes: Bytes = Field(default=0, description="Request that reads many nodes [bytes]", examples=[8])
-    sync_write_bytes: Bytes = Field(default=0, description="Request that writes many nodes [bytes]", examples=[8])
-    sync_node_bytes: Bytes = Field(default=0, description="What either has for each node [bytes]", examples=[1])
-    global_bytes: Bytes = Field(
-        default=0, description="Broadcast that may open a cycle, such as Global Control [bytes]", examples=[13]
-    )
-    silence_bits: BitTimes = Field(default=0.0, description="Silence that ends every telegram [bits]", examples=[38.5])
-    silence_us: TimeUs = Field(default=0.0, description="Least of that silence [us]", examples=[1750])
-    min_turn_bits: BitTimes = Field(default=0.0, description="Shortest wait for an answer [bits]", examples=[10])
-    max_turn_bits: BitTimes = Field(default=0.0, description="Longest wait for an answer [bits]", examples=[70])
-    master_turns: bool = Field(
-        default=False,
-        description="Whether the master waits for max_turn_bits, too, before its next telegram, as in WorldFIP",
-        examples=[True],
-    )
-    clock_tolerance: Tolerance = Field(
-        default_factory=lambda: c["SHARES[CLOCK_TOLERANCE]"],
-        description="Largest error of the bit rate, a share of it",
-        examples=[0.01],
-    )
-    return_delay_us: TimeUs = Field(
-        default=0.0, description="Delay of an answer that is set in a new node [us]", examples=[500]
-    )
-    max_nodes: Count = Field(default=1_000_000, description="Most nodes of a bus", examples=[253])
-    max_bytes: Count = Field(default=1_000_000, description="Most data of a telegram [bytes]", examples=[249])
-    max_bit_rate_kbit_s: Annotated[float, Field(gt=0, le=1e9)] = Field(
-        default=1e9, description="Highest bit rate [kbit/s]", examples=[1000]
-    )
+    bits_per_byte: Number
+    clock_tolerance: Number
+    word_bytes: Number = 1
+    read_request_bytes: Number = 0
+    read_answer_bytes: Number = 0
+    write_request_bytes: Number = 0
+    write_answer_bytes: Number = 0
+    exchange_request_bytes: Number = 0
+    exchange_answer_bytes: Number = 0
+    sync_read_bytes: Number = 0
+    sync_write_bytes: Number = 0
+    sync_node_bytes: Number = 0
+    global_bytes: Number = 0
+    silence_bits: Number = 0.0
+    silence_us: Number = 0.0
+    min_turn_bits: Number = 0.0
+    max_turn_bits: Number = 0.0
+    master_turns: Number = False
+    return_delay_us: Number = 0.0
+    max_nodes: Number = UNLIMITED
+    max_bytes: Number = UNLIMITED
+    max_bit_rate_kbit_s: Number = UNLIMITED_KBIT_S
+    called: tuple[str, ...] = ()
+    """What users call it, its title first; none of a user's own."""
+    rates: Mapping[str, Any] = MappingProxyType({"kbit_s": ()})
+    """Usual bit rates, for plans, with grade and source."""
+    evidence: tuple[str, ...] = ()
+    """Data that its figures are checked against."""
+    is_buffered: bool = False
+    """Whether nodes answer from a buffer: their execution runs beside the telegrams."""
+    is_stuffed: bool = False
+    """Whether data may get stuffed bytes, one in three at most; the figures have none."""
+    has_token: bool = False
+    """Whether the time ratios of PROFIBUS hold, with token and GAP once a cycle."""
+    has_arbiter: bool = False
+    """Whether the master waits once more before it answers a request of its own."""
 
     @property
     def requests(self) -> tuple[Requests, ...]:
         """The ways to ask that it has, the fastest first."""
-        ways: dict[Requests, float] = {
+        ways: dict[Requests, Number] = {
             "exchange": self.exchange_request_bytes,
             "sync": self.sync_read_bytes,
             "single": self.read_request_bytes,
@@ -92,27 +89,17 @@ class Protocol(Section):
 
 
 @cached(maxsize=16)
-def _shipped(name: str) -> Protocol:
+def _shipped(name: str) -> ProtocolFigures:
     """A protocol of the constants, whose values keep their sources."""
-    values: Any = {key.lower(): value for key, value in c.by_key(name).items()}
-    return Protocol.model_construct(**{key: value for key, value in values.items() if key in Protocol.model_fields})
+    table = PROTOCOLS[name]
+    values: Any = {key.lower(): value for key, value in c.by_key(table).items()} | c.beside[table]
+    known = {key: values[key] for key in ProtocolFigures._fields if key in values}
+    return ProtocolFigures(**{"clock_tolerance": c["SHARES[CLOCK_TOLERANCE]"], **known})
 
 
-_CONSTANTS: Final[dict[str, str]] = {
-    "profibus-dp": "PROFIBUS",
-    "modbus-rtu": "MODBUS",
-    "dynamixel-2": "DYNAMIXEL",
-    "feetech": "FEETECH",
-    "worldfip": "WORLDFIP",
-}
-"""Name of the constants of each protocol."""
-BUFFERED: Final = ("profibus-dp", "worldfip")
-"""Protocols whose nodes answer from a buffer: their execution runs beside the telegrams."""
-
-
-def protocol_of(bus: Any) -> Protocol:
+def protocol_of(bus: Any) -> ProtocolFigures:
     """The protocol of a section [bus]."""
-    return _shipped(_CONSTANTS[bus.protocol]) if isinstance(bus.protocol, str) else bus.protocol
+    return _shipped(bus.protocol) if isinstance(bus.protocol, str) else ProtocolFigures(**vars(bus.protocol))
 
 
 class Times(NamedTuple):
@@ -138,7 +125,7 @@ def times(network: Network) -> Times:
     """Times between the telegrams of a network [us]."""
     bus, protocol = network.profile.bus, protocol_of(network.profile.bus)
     bit_us = 1000 / bus.bit_rate_kbit_s
-    if bus.protocol == "profibus-dp":
+    if protocol.has_token:
         return _profibus(bus, bit_us)
     silence_us = larger(_bits_us(protocol.silence_bits, bit_us), protocol.silence_us)
     delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
@@ -148,8 +135,7 @@ def times(network: Network) -> Times:
     if not is_off(most_bits):
         longest_us = larger(silence_us + most_bits * bit_us + delay_us, shortest_us)
     after_us = silence_us + (_bits_us(most_bits, bit_us) if protocol.master_turns else 0.0)
-    # An arbiter waits once more before it answers a request of its own.
-    silent_us = after_us * (2 if bus.protocol == "worldfip" else 1)
+    silent_us = after_us * (2 if protocol.has_arbiter else 1)
     return Times(0.0, shortest_us, longest_us, after_us, silent_us, 0.0, bus.timeout_us or 0.0)
 
 

@@ -1,14 +1,73 @@
 """The keys that only profiles of polled buses have, in [bus]."""
 
 from collections.abc import Iterator
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from busplan.buses.polled.protocols import BitTimes, Protocol, ProtocolName, Requests, Tolerance, protocol_of
-from busplan.sections.base import Count, Problem, TimeUs
+from busplan.buses.polled.protocols import PROTOCOLS, UNLIMITED, UNLIMITED_KBIT_S, Requests, c, protocol_of
+from busplan.english import listed
+from busplan.sections.base import Bytes, Count, Problem, Section, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
+
+BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+Tolerance = Annotated[float, Field(ge=0, le=0.05, allow_inf_nan=False)]
+if TYPE_CHECKING:
+    ProtocolName = str
+else:
+    ProtocolName = Literal[tuple(PROTOCOLS)]
+
+
+class Protocol(Section):
+    """Section [bus.protocol]: a serial protocol of the user's own; a size is without data, 0 for no such telegram."""
+
+    bits_per_byte: Annotated[float, Field(ge=8, le=12)] = Field(description="Bits of a byte on the wire", examples=[10])
+    word_bytes: Annotated[int, Field(ge=1, le=64)] = Field(
+        default=1,
+        description="Data of a telegram are whole words of this size, as registers of Modbus [bytes]",
+        examples=[2],
+    )
+    read_request_bytes: Bytes = Field(default=0, description="Request to read one node [bytes]", examples=[8])
+    read_answer_bytes: Bytes = Field(default=0, description="Answer to it, without its data [bytes]", examples=[6])
+    write_request_bytes: Bytes = Field(
+        default=0, description="Request to write one node, without its data [bytes]", examples=[7]
+    )
+    write_answer_bytes: Bytes = Field(
+        default=0, description="Answer to it; 0 where nodes do not answer a write [bytes]", examples=[6]
+    )
+    exchange_request_bytes: Bytes = Field(
+        default=0, description="Request that writes and reads one node, without its data [bytes]", examples=[9]
+    )
+    exchange_answer_bytes: Bytes = Field(default=0, description="Answer to it, without its data [bytes]", examples=[9])
+    sync_read_bytes: Bytes = Field(default=0, description="Request that reads many nodes [bytes]", examples=[8])
+    sync_write_bytes: Bytes = Field(default=0, description="Request that writes many nodes [bytes]", examples=[8])
+    sync_node_bytes: Bytes = Field(default=0, description="What either has for each node [bytes]", examples=[1])
+    global_bytes: Bytes = Field(
+        default=0, description="Broadcast that may open a cycle, such as Global Control [bytes]", examples=[13]
+    )
+    silence_bits: BitTimes = Field(default=0.0, description="Silence that ends every telegram [bits]", examples=[38.5])
+    silence_us: TimeUs = Field(default=0.0, description="Least of that silence [us]", examples=[1750])
+    min_turn_bits: BitTimes = Field(default=0.0, description="Shortest wait for an answer [bits]", examples=[10])
+    max_turn_bits: BitTimes = Field(default=0.0, description="Longest wait for an answer [bits]", examples=[70])
+    master_turns: bool = Field(
+        default=False,
+        description="Whether the master waits for max_turn_bits, too, before its next telegram, as in WorldFIP",
+        examples=[True],
+    )
+    clock_tolerance: Tolerance = Field(
+        default_factory=lambda: float(c["SHARES[CLOCK_TOLERANCE]"]),
+        description="Largest error of the bit rate, a share of it",
+        examples=[0.01],
+    )
+    return_delay_us: TimeUs = Field(
+        default=0.0, description="Delay of an answer that is set in a new node [us]", examples=[500]
+    )
+    max_nodes: Count = Field(default=UNLIMITED, description="Most nodes of a bus", examples=[253])
+    max_bytes: Count = Field(default=UNLIMITED, description="Most data of a telegram [bytes]", examples=[249])
+    max_bit_rate_kbit_s: Annotated[float, Field(gt=0, le=1e9)] = Field(
+        default=UNLIMITED_KBIT_S, description="Highest bit rate [kbit/s]", examples=[1000]
+    )
 
 
 class PolledBus(BusSection):
@@ -19,8 +78,7 @@ class PolledBus(BusSection):
         Annotated[ProtocolName, Tag("(a name)")] | Annotated[Protocol, Tag("(a table)")],
         Discriminator(lambda value: "(a table)" if isinstance(value, dict | Protocol) else "(a name)"),
     ] = Field(
-        description="Protocol: profibus-dp, modbus-rtu, dynamixel-2, feetech or worldfip, or a table [bus.protocol] "
-        "of your own",
+        description=f"Protocol: {listed(tuple(PROTOCOLS), 'or')}, or a table [bus.protocol] of your own",
         examples=["dynamixel-2"],
     )
     bit_rate_kbit_s: Annotated[float, Field(ge=1, le=100_000, allow_inf_nan=False)] = Field(
@@ -54,7 +112,7 @@ class PolledBus(BusSection):
     clock_tolerance: Tolerance | None = Field(
         default=None,
         description="How much longer or shorter than they should be all bits may be, a share 0..0.05: a doubt of the "
-        "cycle; 0 for exact clocks. Without it the protocol's: 0.01 of modbus-rtu, else 0.005, assumed",
+        "cycle; 0 for exact clocks. Without it the protocol's; where that says nothing 0.005, assumed",
         examples=[0.0001],
     )
     adapter_us: TimeUs = Field(
@@ -88,9 +146,9 @@ class PolledBus(BusSection):
             yield Problem(f"the protocol has none of these; it has {', '.join(ways)}", "requests")
         if self.global_control and not protocol.global_bytes:
             yield Problem("the protocol has no broadcast that opens a cycle", "global_control")
-        if self.retries and self.timeout_us is None and self.protocol != "profibus-dp":
+        if self.retries and self.timeout_us is None and not protocol.has_token:
             yield Problem("a repeated request waits for a timeout; give bus.timeout_us", "retries")
-        if self.return_delay_us is not None and self.protocol == "profibus-dp":
+        if self.return_delay_us is not None and protocol.has_token:
             yield Problem("PROFIBUS has no return delay; give max_turn_bits", "return_delay_us")
 
 

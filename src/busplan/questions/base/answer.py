@@ -146,7 +146,7 @@ class Answer(ABC):
         profile = _profile_of(self)
         if profile is None or not profile.constants:
             return self.report()
-        from busplan.questions.base.inputs import key_changes
+        from busplan.questions.base.arguments import key_changes
         from busplan.questions.base.sentences import changed_report
 
         return changed_report(

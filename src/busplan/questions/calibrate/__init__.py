@@ -19,7 +19,7 @@ from busplan.profile.document import read_bytes
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, measurements_from, parse_measurements
 from busplan.profile.sources import locate_measurements
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_network, with_its_constants
+from busplan.questions.base.arguments import FilePath, ProfileLike, checked_models, load_network, with_its_constants
 from busplan.questions.fit.network import OfNetwork
 from busplan.sections.base import TransactionKind
 from busplan.sections.cycle import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
@@ -187,7 +187,7 @@ class Columns(Protocol):
     def __getitem__(self, name: Any, /) -> Any: ...
 
 
-Measurements = Path | bytes | Columns | Iterable[Mapping[str, Any]] | Iterable[Iterable[Any]]
+Measurements = FilePath | bytes | Columns | Iterable[Mapping[str, Any]] | Iterable[Iterable[Any]]
 """Measured latencies: a CSV file, CSV text, columns by name, or rows."""
 
 

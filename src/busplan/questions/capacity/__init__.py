@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     Models,
     Periods,
     ProfileLike,

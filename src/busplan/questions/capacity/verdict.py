@@ -33,7 +33,7 @@ from busplan.questions.fit.figures import (
     figures,
     limits_behind,
 )
-from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
+from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits, smallest_period
 from busplan.questions.fit.network import changed
 from busplan.sections.base import MAX_COUNT

@@ -10,7 +10,14 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole, with_its_constants
+from busplan.questions.base.arguments import (
+    Periods,
+    ProfileLike,
+    load_network,
+    one_or_several,
+    whole,
+    with_its_constants,
+)
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 

@@ -15,11 +15,17 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, require_cycle, with_its_constants
+from busplan.questions.base.arguments import (
+    ProfileLike,
+    load_profile,
+    one_or_several,
+    require_cycle,
+    with_its_constants,
+)
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
-from busplan.questions.fit.inputs import assumed_rates, given
+from busplan.questions.fit.graded import assumed_rates, given
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
 from busplan.questions.fit.network import OfNetwork, at_period, changed, network_of, varied_nodes
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at

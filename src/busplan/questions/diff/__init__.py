@@ -15,7 +15,7 @@ from busplan.forms.blocks import Report
 from busplan.profile.kinds import KeyValue, dotted_keys
 from busplan.profile.sources import load_revision
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_network
+from busplan.questions.base.arguments import Models, ProfileLike, argument, checked_models, finite, load_network
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.needs import missed_limits

@@ -9,7 +9,7 @@ from busplan.english import listed, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     Models,
     Periods,
     ProfileLike,
@@ -33,7 +33,7 @@ from busplan.sections.profile import Profile
 from busplan.sourced import Input
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, repr=False)
 class ExplainAnswer(Answer):
     """Answer of `explain`.
 
@@ -65,7 +65,7 @@ class ExplainAnswer(Answer):
 
     def _headline(self) -> str:
         if self.derivations:
-            return Answer._headline(self)  # noqa: SLF001 - super() knows no class with slots made anew
+            return super()._headline()
         return f"{self.profile.name}: {plural(len(self.assumptions), 'assumption')} behind its verdict"
 
 

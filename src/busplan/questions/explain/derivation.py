@@ -19,7 +19,7 @@ from busplan.errors import BusplanError
 from busplan.questions.explain.formula import formula_text, inputs, lines
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures
-from busplan.questions.fit.inputs import choosing_keys, traced_network
+from busplan.questions.fit.graded import choosing_keys, traced_network
 from busplan.questions.fit.network import model_names
 from busplan.sourced import Input, Sourced, short
 
@@ -266,7 +266,7 @@ def wanted(name: str, network: Network) -> Wanted:
 
     Examples
     --------
-    >>> from busplan.questions.base.inputs import load_network
+    >>> from busplan.questions.base.arguments import load_network
     >>> [figure.key for figure in wanted("(11)", load_network("paper-4ms")).figures]
     ['nodes_eq11']
     >>> wanted("sdo-request", load_network("can-servo-8")).transactions

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any, Final
 
 from busplan.elementwise import plain
@@ -13,7 +13,7 @@ from busplan.profile.document import decode, validate
 from busplan.profile.edit import short_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, finite, one_or_several
+from busplan.questions.base.arguments import FilePath, finite, one_or_several
 from busplan.questions.base.sentences import document
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import PERIOD, network_of
@@ -101,7 +101,7 @@ def _shown(value: object) -> ShownValue | str:
 
 
 def import_profile(
-    paths: Path | Iterable[Path],
+    paths: FilePath | Iterable[FilePath],
     *,
     name: str | None = None,
     bus: str | None = None,
@@ -170,7 +170,7 @@ def import_profile(
         if machine.kind != "can":
             raise BusplanError(f"bit rate {bit_rate_kbit_s:g}: the files are of no CAN bus")
         can.give_bit_rate(machine, finite(bit_rate_kbit_s, name="bit_rate_kbit_s"))
-    title = name or ("machine" if names[0] == "-" else FilePath(names[0]).stem)
+    title = name or ("machine" if names[0] == "-" else Path(names[0]).stem)
     rows = list(_ROWS[machine.kind](machine))
     text = profile_text(rows, name=title, readings=readings)
     profile = _validated(text, machine)

@@ -19,7 +19,7 @@ from busplan.forms.scale import round_numbers
 from busplan.profile.edit import whole
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_network, require_cycle, with_its_constants
+from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals

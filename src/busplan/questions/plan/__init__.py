@@ -13,7 +13,7 @@ from busplan.profile.changes import KeyChange, KeyChanges
 from busplan.profile.edit import whole as as_whole
 from busplan.profile.kinds import flat
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     ProfileLike,
     finite,
     from_numpy,

@@ -30,7 +30,7 @@ from busplan.forms.blocks import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges, change_options, shell_word
 from busplan.progress import Progress, part_of
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Origin, ProfileLike, load_profile, one_or_several, origin_of
+from busplan.questions.base.arguments import Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.base.sentences import changed_report, document
 from busplan.questions.capacity import capacity
 from busplan.questions.capacity.verdict import Verdict, card

@@ -16,7 +16,7 @@ from busplan.forms.blocks import Code, Report, Sentence
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     Models,
     ProfileLike,
     checked_models,
@@ -44,7 +44,7 @@ _SHOWN: Final = 20
 """Rows of the report."""
 
 
-@dataclass(frozen=True, slots=True, repr=False, eq=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class SweepAnswer(Answer, Mapping[str, Array]):
     """Answer of `sweep`: columns by name, with a row for each point and timing model, in the order of the grid.
 
@@ -179,7 +179,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         rows = {ending: partial(self._bytes_in, form) for ending, form in ROWS_ENDINGS.items()}
-        return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
+        return {**super()._contents(), **rows}
 
     def _bytes_in(self, form: RowsForm) -> bytes:
         return b"".join(self.rows_in(form))

@@ -17,7 +17,7 @@ from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.profile.edit import whole
 from busplan.profile.kinds import cycle_keys, dotted_keys, words_of
-from busplan.questions.base.inputs import checked_model, items
+from busplan.questions.base.arguments import checked_model, items
 from busplan.questions.fit.network import changed, model_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 

@@ -8,7 +8,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import (
+from busplan.questions.base.arguments import (
     ProfileLike,
     checked_models,
     finite,

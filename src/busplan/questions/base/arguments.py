@@ -19,9 +19,9 @@ from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 
-Path = str | os.PathLike[str]
+FilePath = str | os.PathLike[str]
 """A str may also be the name of a shipped profile; a path object is always a path."""
-ProfileLike = Profile | Path
+ProfileLike = Profile | FilePath
 Periods = float | Iterable[float]
 """A communication period [us], or several."""
 Models = str | Iterable[str]
@@ -130,7 +130,7 @@ def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str
     return {key: from_numpy(value) for key, value in (values or {}).items()}
 
 
-def argument(path: Path) -> str:
+def argument(path: FilePath) -> str:
     """Write a path as the PROFILE argument of the command line.
 
     Raises
