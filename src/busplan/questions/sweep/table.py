@@ -260,7 +260,7 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str
 
 
 def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Array]:
-    most, axes = most_nodes(network, limits), network.varied_group.node.axes
+    most, axes = most_nodes(network.with_nodes, limits), network.varied_group.node.axes
     counted = {
         "max_nodes": _number(most.nodes, "count"),
         "max_axes": _number(axes * most.nodes, "count"),
@@ -270,7 +270,7 @@ def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict
         return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _objects([None])}
     to_be_safe = limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.
-    safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
+    safe = most_nodes(network.with_nodes, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
     return {
         **counted,
         "safe_nodes": _number(safe.nodes, "count"),
