@@ -40,7 +40,7 @@ def test_the_most_are_those_that_a_count_finds_and_the_first_limit_of_equal_ones
     def counted(form: str, most: int) -> int:
         return sum(bool(FORMS[form](nodes) <= most) for nodes in range(1, ceiling + 2))
 
-    found = most_nodes(NETWORK, [limit_of(*one) for one in asked], ceiling=ceiling)
+    found = most_nodes(NETWORK.with_nodes, [limit_of(*one) for one in asked], ceiling=ceiling)
     each = [counted(form, to) for form, to, _ in asked]
     assert found.nodes == min(*each, ceiling)
     if found.nodes < ceiling:
@@ -56,8 +56,8 @@ def test_an_array_is_answered_as_each_of_its_points(asked: list[tuple[str, int, 
         bounds = [limit_of(form, most + point, is_slow) for form, most, is_slow in asked[::2]]
         return [*bounds, *(limit_of(*one, less=point) for one in asked[1::2])]
 
-    together = most_nodes(NETWORK, at(points), ceiling=30)
-    alone = [[most_nodes(NETWORK, at(int(point)), ceiling=30) for point in row] for row in points]
+    together = most_nodes(NETWORK.with_nodes, at(points), ceiling=30)
+    alone = [[most_nodes(NETWORK.with_nodes, at(int(point)), ceiling=30) for point in row] for row in points]
     for name in ("nodes", "limit"):
         whole = np.broadcast_to(np.asarray(getattr(together, name)), points.shape)
         assert whole.tolist() == [[getattr(one, name) for one in row] for row in alone]

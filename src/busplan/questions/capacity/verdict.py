@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, floor, isfinite, log10
-from typing import Final
+from typing import Final, TypeAlias
 
 from busplan.buses.cycle import LeftOut
 from busplan.buses.network import Network
@@ -108,7 +108,11 @@ class Verdict:
         return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
 
 
-def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdict:
+Fastest: TypeAlias = tuple[SmallestPeriod | None, SettingForPeriod | None]
+"""`fastest` and `best_register` of a verdict."""
+
+
+def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastest: Fastest | None = None) -> Verdict:
     """Judge a network at its period.
 
     Parameters
@@ -117,6 +121,8 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         The network.
     results
         Its figures under the timing models that were asked for.
+    fastest
+        Those of the same network at another period, if they are known: they are the same.
     """
     bus = network.bus
     model = bus.deciding_model
@@ -127,7 +133,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
     ratio = float(plain(network.slice_ratio))
     missed = {need.key: need.words(ratio=ratio, most_us=period_us) for need in missed_limits(network)}
     change, no_change = _change(network, deciding, is_missed=bool(missed))
-    fastest = smallest_period(network, is_safe=False, with_limits=False) if network.groups else None
+    least, best = fastest or _fastest_of(network)
     return Verdict(
         network=network,
         period_us=period_us,
@@ -135,8 +141,8 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         others=tuple(result for result in results if result is not deciding),
         broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
         missed_limits=tuple(missed.items()),
-        fastest=fastest,
-        best_register=None if fastest is None else best_register(network, fastest),
+        fastest=least,
+        best_register=best,
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
         left_out=cycle.left_out(),
@@ -147,6 +153,14 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         no_change=no_change,
         setting=None if change is None else _setting(network, deciding, change),
     )
+
+
+def _fastest_of(network: Network) -> Fastest:
+    """The shortest period of a network as it is set, and the setting of a register that makes it the shortest."""
+    if not network.groups:
+        return None, None
+    least = smallest_period(network, is_safe=False, with_limits=False)
+    return least, best_register(network, least)
 
 
 def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple[Change | None, str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
@@ -31,6 +31,7 @@ from busplan.questions.fit.certainty import (
 )
 from busplan.questions.fit.network import trial
 from busplan.sections.base import MAX_COUNT
+from busplan.sections.machine import ProfileGroup
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,6 +43,20 @@ class MostNodes(NamedTuple):
 
     nodes: Number
     limit: Number
+    limits: Sequence[Limit]
+    """The limits that were tried."""
+
+    @property
+    def words(self) -> tuple[int, str]:
+        """The number of nodes and the key of the limit, of plain numbers."""
+        return int(plain(self.nodes)), self.limits[int(plain(self.limit))].key
+
+    def words_at(self, points: int) -> list[tuple[int, str]]:
+        """The same at each point of arrays."""
+        import numpy as np
+
+        numbers = np.broadcast_arrays(self.nodes, self.limit, np.empty(points))[:2]
+        return [(int(nodes), self.limits[int(index)].key) for nodes, index in zip(*numbers, strict=True)]
 
 
 def safe_nodes(network: Network, *, group: str = "", without: str | None = None) -> tuple[int, str]:
@@ -64,12 +79,29 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
         Number of nodes [1], and the key of the limit.
     """
     limits = [limit for limit in limits_to_be_safe(network) if limit.key != without]
-    return _in_words(most_nodes(network.varying(group).with_nodes, limits), limits)
+    return most_nodes(network.varying(group).with_nodes, limits).words
 
 
-def _in_words(most: MostNodes, limits: Sequence[Limit]) -> tuple[int, str]:
-    """The number of nodes and the key of the limit, of plain numbers."""
-    return int(plain(most.nodes)), limits[int(plain(most.limit))].key
+def most_and_safe_nodes(
+    with_nodes: Callable[[Number], Network], network: Network, *, model: str
+) -> tuple[MostNodes, MostNodes | None]:
+    """Find the most nodes that fit, and that are shown to fit; None under a timing model that does not decide.
+
+    Parameters
+    ----------
+    with_nodes
+        As `most_nodes` takes it.
+    network
+        A network of the same kind of bus.
+    model
+        Name of the timing model.
+    """
+    most = most_nodes(with_nodes, limits_with_time(network, model=model))
+    if model != network.bus.deciding_model:
+        return most, None
+    # No more nodes are shown to fit than fit.
+    ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else plain(most.nodes)) + 1
+    return most, most_nodes(with_nodes, limits_to_be_safe(network), ceiling=min(ceiling, MAX_COUNT))
 
 
 def most_nodes(
@@ -101,7 +133,7 @@ def most_nodes(
     first: Number = len(limits) - 1  # time, if no limit binds
     for index in sorted(most, reverse=True):
         first = choose(most[index] <= nodes, index, first)
-    return MostNodes(nodes, first)
+    return MostNodes(nodes, first, limits)
 
 
 _HUGE: Final = 1e300
@@ -121,7 +153,7 @@ def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling:
     # `low` nodes keep the limit, `high` nodes break it.
     low, high = choose(over > 0, 0, ceiling), choose(over > 0, ceiling, ceiling + 1)
     low_over: Number = -inf
-    high_over, tried = over, 1
+    high_over, tried = choose(over > 0, over, inf), 1
     for step in count(1):
         over = limit.excess(with_nodes(tried))
         is_over = over > 0
@@ -160,6 +192,14 @@ class GroupCapacity:
     """Their axes."""
     safe_limited_by: str | None
     """Key of the limit that keeps `safe_nodes` from being more."""
+
+    @classmethod
+    def of(cls, group: ProfileGroup, most: tuple[int, str], safe: tuple[int, str] | None) -> Self:
+        """The capacity of a group, from its counts: nodes, and the key of the limit."""
+        nodes, axes = int(group.nodes), group.node.axes
+        safe_nodes, safe_limit = safe or (None, None)
+        safe_axes = None if safe_nodes is None else axes * safe_nodes
+        return cls(group.name, nodes, nodes * axes, most[0], axes * most[0], most[1], safe_nodes, safe_axes, safe_limit)
 
 
 @dataclass(frozen=True)
@@ -242,8 +282,11 @@ class CapacityFigures(FitFigures):
 
 def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
     """Whether a network fits its own period under one timing model, and how many nodes would."""
-    fit = figures(network, model=model)
-    counts = node_counts(network, model=model)
+    return with_counts(figures(network, model=model), node_counts(network, model=model))
+
+
+def with_counts(fit: FitFigures, counts: tuple[GroupCapacity, ...]) -> CapacityFigures:
+    """The figures together with the counts of each group."""
     if not counts or counts[0].name:
         return CapacityFigures(**vars(fit), counts=counts, groups=counts)
     return CapacityFigures(**vars(fit), counts=counts, **{key: getattr(counts[0], key) for key in COUNTS})
@@ -251,52 +294,45 @@ def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
 
 def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
-    most = _most_of_each(network, limits_with_time(network, model=model), [MAX_COUNT] * len(network.names))
-    safe: Sequence[tuple[int | None, str | None]] = [(None, None)] * len(most)
-    if model == network.bus.deciding_model:
-        # No more nodes are shown to fit than fit.
-        safe = _most_of_each(network, limits_to_be_safe(network), [min(nodes + 1, MAX_COUNT) for nodes, _ in most])
-    return tuple(
-        GroupCapacity(
-            name=group.name,
-            nodes=int(group.nodes),
-            axes=int(group.nodes) * group.node.axes,
-            max_nodes=max_nodes,
-            max_axes=group.node.axes * max_nodes,
-            limited_by=limited_by,
-            safe_nodes=safe_nodes,
-            safe_axes=None if safe_nodes is None else group.node.axes * safe_nodes,
-            safe_limited_by=safe_limited_by,
-        )
-        for group, (max_nodes, limited_by), (safe_nodes, safe_limited_by) in zip(
-            network.profile.node_groups, most, safe, strict=True
-        )
-    )
+    groups = network.profile.node_groups
+    if len(groups) < _MANY_GROUPS or not has_arrays(network):
+        found = (most_and_safe_nodes(network.varying(group.name).with_nodes, network, model=model) for group in groups)
+        words = [(most.words, safe and safe.words) for most, safe in found]
+    else:
+        words = _words_of_each(network, model=model)
+    return tuple(GroupCapacity.of(group, *counts) for group, counts in zip(groups, words, strict=True))
 
 
+def has_arrays(network: Network) -> bool:
+    """Whether its limits are computed for many numbers of nodes at once, in arrays, and not point by point."""
+    is_slow = any(limit.is_slow for limit in network.bus.limits) or any(group.is_slower for group in network.groups)
+    return not is_slow
+
+
+Counts: TypeAlias = tuple[tuple[int, str], tuple[int, str] | None]
+"""Most nodes that fit and the key of the limit, and the same to be shown to fit."""
 _MANY_GROUPS: Final = 16
 """From so many groups on, arrays are faster than plain numbers."""
 _GROUPS_AT_ONCE: Final = 512
 
 
-def _most_of_each(network: Network, limits: Sequence[Limit], ceilings: Sequence[int]) -> list[tuple[int, str]]:
-    """Most nodes of each group, the others as they are, and the key of the limit."""
-    names = network.names
-    has_arrays = not any(limit.is_slow for limit in limits) and not any(group.is_slower for group in network.groups)
-    if len(names) < _MANY_GROUPS or not has_arrays:
-        return [
-            _in_words(most_nodes(network.varying(name).with_nodes, limits, ceiling=ceiling), limits)
-            for name, ceiling in zip(names, ceilings, strict=True)
-        ]
+def _words_of_each(network: Network, *, model: str) -> list[Counts]:
+    """The counts of each group, the others as they are: a group is a point of an array."""
     import numpy as np
 
-    found: list[tuple[int, str]] = []
-    for start in range(0, len(names), _GROUPS_AT_ONCE):
-        places = np.arange(start, min(start + _GROUPS_AT_ONCE, len(names)))
-        most = most_nodes(partial(_with_nodes_of_one, network, places), limits, ceiling=max(ceilings))
-        numbers = np.broadcast_arrays(most.nodes, most.limit, places)[:2]
-        found += [(int(nodes), limits[int(index)].key) for nodes, index in zip(*numbers, strict=True)]
-    return found
+    words: list[Counts] = []
+    number = len(network.names)
+    for start in range(0, number, _GROUPS_AT_ONCE):
+        places = np.arange(start, min(start + _GROUPS_AT_ONCE, number))
+        found = most_and_safe_nodes(partial(_with_nodes_of_one, network, places), network, model=model)
+        words += counts_at(found, len(places))
+    return words
+
+
+def counts_at(found: tuple[MostNodes, MostNodes | None], points: int) -> list[Counts]:
+    """Counts at each point of arrays."""
+    most, safe = found
+    return [*zip(most.words_at(points), safe.words_at(points) if safe else [None] * points, strict=True)]
 
 
 def _with_nodes_of_one(network: Network, places: "NDArray[np.int_]", nodes: Number) -> Network:
