@@ -44,6 +44,29 @@ def lines_of(period_us: float, axes: int, size: int) -> dict[str, str]:
     return {"": card.verdict.text, **{label: sentence_text(words) for label, words in card.lines}}
 
 
+@pytest.mark.parametrize(
+    ("name", "x", "y"),
+    [
+        ("gantry-24", {"group.drives.nodes": [2, 20]}, {"bus.gap_count": [63, "optimal"]}),
+        ("can-servo-8", {"bus.nodes": [3, 40]}, {"cycle.period_us": [1000, 4000]}),
+    ],
+)
+def test_the_card_of_a_setting_is_that_of_capacity_of_groups_words_and_searches(
+    name: str, x: dict[str, list[int]], y: dict[str, list[int | str]]
+) -> None:
+    ((key_x, values_x), (key_y, values_y)) = (*x.items(), *y.items())
+    own = next(iter(busplan.load_profile(name).node_groups))
+    over = {own.payload_key("write"): [own.payload.write_bytes or 4]}
+    answer = busplan.explore(name, x=x, y=y, over=over)
+    cards = iter(answer.cards[0])
+    for value_y in values_y:
+        for value_x in values_x:
+            changes = {key_x: value_x, key_y: value_y, **{key: sizes[0] for key, sizes in over.items()}}
+            profile = busplan.load_profile(name, changes=changes)
+            (card,) = (block for block in busplan.capacity(profile).report().blocks if isinstance(block, Card))
+            assert next(cards) == card
+
+
 def settings(
     text: str, *, over: tuple[int, ...] = SIZES
 ) -> Iterator[tuple[tuple[float, int, int], dict[str, str] | None]]:

@@ -149,6 +149,10 @@ class Limit(NamedTuple):
         """Whether a network surely breaks it, at the lower bound of the value: a bool, or an array of them."""
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
+    def excess(self, network: Network) -> Number:
+        """By how much the lower bound of the value is over `most`: more than 0 where a network surely breaks it."""
+        return self.least_value(network) - self.most(network) * (1 + FIT_ROUNDING)
+
     def verdict_code(self, network: Network) -> Number:
         """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
         surely = choose(self.is_broken(network), BROKEN, KEPT)

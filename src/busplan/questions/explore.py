@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 from math import ceil, prod
 from typing import Final
 
@@ -16,20 +17,21 @@ from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
-from busplan.questions.capacity.verdict import card, verdict_of
-from busplan.questions.fit.figures import capacity_figures
-from busplan.questions.fit.network import changed, model_names, varied_nodes
+from busplan.questions.capacity.verdict import Fastest, Verdict, card, verdict_of
+from busplan.questions.fit.grid import capacities
+from busplan.questions.fit.network import PERIOD, changed, varied_nodes
 from busplan.questions.map import (
     Along,
     Cell,
     Direction,
+    Grid,
     MapAnswer,
     NotDrawn,
     design_value,
     direction,
     directions,
-    map_,
-    setting_at,
+    map_of,
+    settings_of,
 )
 from busplan.questions.map.report import circle_words, map_document, map_drawing, title_of, value_text
 from busplan.sections.base import TRANSACTION_KINDS, value_at
@@ -167,21 +169,36 @@ def explore(
         )
     chosen = directions(network, x, y, with_circle=circle)
     _require_few(*chosen, third)
-    across, up = ({along.key: list(along.values)} for along in chosen)
     maps, cards = [], []
     for number, variant in enumerate(networks):
         part = part_of(progress, number=number, of=len(networks))
-        answer = map_(
-            variant.profile,
-            x=across,
-            y=up,
+        grid = settings_of(variant, *chosen)
+        judged = _judged(grid, part_of(part, number=0, of=2) if circle else part)
+        answer = map_of(
+            grid,
+            {place: verdict.deciding for place, verdict in judged.items()},
             circle=circle,
             executor=executor,
-            progress=part_of(part, number=0, of=2) if circle else ignored,
+            progress=part_of(part, number=1, of=2) if circle else ignored,
         )
         maps.append(answer)
-        cards.append(tuple(_cards(answer, part_of(part, number=1, of=2) if circle else part)))
+        places = product(range(len(answer.rows)), range(len(answer.rows[0])))
+        cards.append(tuple(_card(answer, judged.get(place), answer.rows[place[0]][place[1]]) for place in places))
     return ExploreAnswer(network, third, tuple(maps), tuple(cards))
+
+
+def _judged(grid: Grid, progress: Progress) -> dict[tuple[int, int], Verdict]:
+    """The verdict of `capacity` at each setting; those that differ in their period alone share the fastest one."""
+    results = capacities(grid.network, [*grid.settings.values()])
+    fastest: dict[object, Fastest] = {}
+    judged = {}
+    for number, ((place, setting), result) in enumerate(zip(grid.settings.items(), results, strict=True)):
+        progress(number, len(results))
+        point = setting.without(PERIOD)
+        verdict = verdict_of(setting.network, result, fastest=fastest.get(point))
+        fastest[point] = verdict.fastest, verdict.best_register
+        judged[place] = verdict
+    return judged
 
 
 def _third(network: Network, over: Along | None, *, with_circle: bool) -> Direction | None:
@@ -216,18 +233,8 @@ def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
         raise BusplanError(f"{settings:,} settings; an explorer has up to {MOST_SETTINGS:,}: give fewer values")
 
 
-def _cards(answer: MapAnswer, progress: Progress) -> Iterator[Card | None]:
-    """The card of each cell of a map, row by row."""
-    for number, row in enumerate(answer.rows):
-        progress(number, len(answer.rows))
-        yield from (_card(answer, cell) for cell in row)
-
-
-def _card(answer: MapAnswer, cell: Cell | NotDrawn) -> Card | None:
-    setting = setting_at(answer.network, answer.values_at(cell))
-    if isinstance(cell, NotDrawn) or isinstance(setting, str):
+def _card(answer: MapAnswer, verdict: Verdict | None, cell: Cell | NotDrawn) -> Card | None:
+    if verdict is None or isinstance(cell, NotDrawn):
         return None
-    results = tuple(capacity_figures(setting.network, model=model) for model in model_names(setting.network))
-    made = card(verdict_of(setting.network, results))
-    circle = circle_words(answer, cell)
+    made, circle = card(verdict), circle_words(answer, cell)
     return made._replace(lines=(*made.lines, *([("circle", circle)] if circle else [])))

@@ -103,7 +103,7 @@ def test_an_array_of_nodes_gives_what_each_number_gives(
             truths = np.broadcast_to(np.asarray(limit.is_broken(network.with_nodes(nodes))), nodes.shape)
             for place, alone in counts.items():
                 assert bool(truths[place]) == bool(limit.is_broken(alone))
-            # Once broken, a limit stays broken: the search by halves rests on that.
+            # Once broken, a limit stays broken: the search for the most nodes rests on that.
             assert sorted(truths.tolist()) == truths.tolist()
 
 

@@ -1,8 +1,10 @@
 """The most nodes within some limits: against a count, and over arrays."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -40,7 +42,7 @@ def test_the_most_are_those_that_a_count_finds_and_the_first_limit_of_equal_ones
     def counted(form: str, most: int) -> int:
         return sum(bool(FORMS[form](nodes) <= most) for nodes in range(1, ceiling + 2))
 
-    found = most_nodes(NETWORK, [limit_of(*one) for one in asked], ceiling=ceiling)
+    found = most_nodes(NETWORK.with_nodes, [limit_of(*one) for one in asked], ceiling=ceiling)
     each = [counted(form, to) for form, to, _ in asked]
     assert found.nodes == min(*each, ceiling)
     if found.nodes < ceiling:
@@ -49,15 +51,60 @@ def test_the_most_are_those_that_a_count_finds_and_the_first_limit_of_equal_ones
 
 @given(asked=limits, shape=st.tuples(st.integers(1, 3), st.integers(1, 40)))
 def test_an_array_is_answered_as_each_of_its_points(asked: list[tuple[str, int, bool]], shape: tuple[int, int]) -> None:
-    # Values that vary are searched by halves, bounds that do are counted.
     points = np.arange(shape[0])[:, None] + np.arange(shape[1])
 
     def at(point: Number) -> list[Limit]:
         bounds = [limit_of(form, most + point, is_slow) for form, most, is_slow in asked[::2]]
         return [*bounds, *(limit_of(*one, less=point) for one in asked[1::2])]
 
-    together = most_nodes(NETWORK, at(points), ceiling=30)
-    alone = [[most_nodes(NETWORK, at(int(point)), ceiling=30) for point in row] for row in points]
+    together = most_nodes(NETWORK.with_nodes, at(points), ceiling=30)
+    alone = [[most_nodes(NETWORK.with_nodes, at(int(point)), ceiling=30) for point in row] for row in points]
     for name in ("nodes", "limit"):
         whole = np.broadcast_to(np.asarray(getattr(together, name)), points.shape)
         assert whole.tolist() == [[getattr(one, name) for one in row] for row in alone]
+
+
+def groups_of(kind: str, number: int) -> str:
+    """A profile of groups that are not alike."""
+    group = """
+[[group]]
+name = "g{place}"
+nodes = {nodes}
+axes = 1
+read_bytes = {size}
+write_bytes = 6
+execution = {{ kind = "linear", grade = "assumed", base_us = 1, per_byte_us = 0.1 }}
+"""
+    start = f"""schema_version = 1
+name = "many"
+[bus]
+kind = "{kind}"
+{'speed = "S400"' if kind == "ieee1394" else ""}
+{"max_hops = 8" if kind == "ieee1394" else ""}
+[cycle]
+period_us = 8000
+slice_ratio = 0.9
+"""
+    return start + "".join(
+        group.format(place=place, nodes=place % 3 + 1, size=4 + place % 5) for place in range(number)
+    )
+
+
+@pytest.mark.parametrize("kind", ["ethercat", "ieee1394"])
+def test_of_many_groups_the_most_nodes_of_each_fit_and_one_more_does_not(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "many.toml"
+    path.write_text(groups_of(kind, 18))
+    decides = busplan.capacity(path).verdicts[0].deciding
+    assert len(decides.groups) == 18
+    for count in decides.groups[::6]:
+        key = f"group.{count.name}.nodes"
+        assert count.safe_nodes is not None
+        assert 0 < count.safe_nodes <= count.max_nodes
+        for nodes, fits, is_shown in (
+            (count.safe_nodes, True, True),
+            (count.safe_nodes + 1, count.safe_nodes < count.max_nodes, False),
+            (count.max_nodes + 1, False, False),
+        ):
+            answer = busplan.capacity(busplan.load_profile(path, changes={key: nodes}))
+            now = answer.verdicts[0].deciding
+            assert (now.fits, now.verdict == "fits" and now.safe) == (fits, is_shown)

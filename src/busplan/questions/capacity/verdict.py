@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import Final
+from typing import Final, TypeAlias
 
 from busplan.buses.cycle import RestsOn
 from busplan.buses.network import Network
@@ -103,7 +103,11 @@ class Verdict:
         return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
 
 
-def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdict:
+Fastest: TypeAlias = tuple[SmallestPeriod | None, SettingForPeriod | None]
+"""`fastest` and `best_register` of a verdict."""
+
+
+def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastest: Fastest | None = None) -> Verdict:
     """Judge a network at its period.
 
     Parameters
@@ -112,6 +116,8 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         The network.
     results
         Its figures under the timing models that were asked for.
+    fastest
+        Those of the same network at another period, if they are known: they are the same.
     """
     bus = network.bus
     model = bus.deciding_model
@@ -121,7 +127,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
     cycle, period_us = bus.cycle(network, model=model), deciding.period_us
     missed = missed_limits(network)
     change, no_change = _change(network, deciding, is_missed=bool(missed))
-    fastest = smallest_period(network, is_safe=False, with_limits=False) if network.groups else None
+    least, best = fastest or _fastest_of(network)
     return Verdict(
         network=network,
         period_us=period_us,
@@ -129,8 +135,8 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         others=tuple(result for result in results if result is not deciding),
         broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
         missed_limits=missed,
-        fastest=fastest,
-        best_register=None if fastest is None else best_register(network, fastest),
+        fastest=least,
+        best_register=best,
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
         rests_on=cycle.rests_on(),
@@ -139,6 +145,14 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         change=change,
         no_change=no_change,
     )
+
+
+def _fastest_of(network: Network) -> Fastest:
+    """The shortest period of a network as it is set, and the setting of a register that makes it the shortest."""
+    if not network.groups:
+        return None, None
+    least = smallest_period(network, is_safe=False, with_limits=False)
+    return least, best_register(network, least)
 
 
 def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple[Change | None, str]:

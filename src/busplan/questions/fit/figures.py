@@ -2,16 +2,17 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import partial
+from itertools import count
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, existing, larger, plain, rounded_up, smaller, total
+from busplan.elementwise import Number, choose, existing, is_everywhere, larger, plain, rounded_down, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,
     NOT_SHOWN,
@@ -30,6 +31,11 @@ from busplan.questions.fit.certainty import (
 )
 from busplan.questions.fit.network import trial
 from busplan.sections.base import MAX_COUNT
+from busplan.sections.machine import ProfileGroup
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class MostNodes(NamedTuple):
@@ -37,6 +43,20 @@ class MostNodes(NamedTuple):
 
     nodes: Number
     limit: Number
+    limits: Sequence[Limit]
+    """The limits that were tried."""
+
+    @property
+    def words(self) -> tuple[int, str]:
+        """The number of nodes and the key of the limit, of plain numbers."""
+        return int(plain(self.nodes)), self.limits[int(plain(self.limit))].key
+
+    def words_at(self, points: int) -> list[tuple[int, str]]:
+        """The same at each point of arrays."""
+        import numpy as np
+
+        numbers = np.broadcast_arrays(self.nodes, self.limit, np.empty(points))[:2]
+        return [(int(nodes), self.limits[int(index)].key) for nodes, index in zip(*numbers, strict=True)]
 
 
 def safe_nodes(network: Network, *, group: str = "", without: str | None = None) -> tuple[int, str]:
@@ -59,74 +79,92 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
         Number of nodes [1], and the key of the limit.
     """
     limits = [limit for limit in limits_to_be_safe(network) if limit.key != without]
-    return _nodes_within(network.varying(group), limits)
+    return most_nodes(network.varying(group).with_nodes, limits).words
 
 
-def _nodes_within(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
-    """The result of `most_nodes` in plain numbers: the number of nodes, and the key of the limit."""
-    most = most_nodes(network, limits)
-    return int(plain(most.nodes)), limits[int(plain(most.limit))].key
+def most_and_safe_nodes(
+    with_nodes: Callable[[Number], Network], network: Network, *, model: str
+) -> tuple[MostNodes, MostNodes | None]:
+    """Find the most nodes that fit, and that are shown to fit; None under a timing model that does not decide.
+
+    Parameters
+    ----------
+    with_nodes
+        As `most_nodes` takes it.
+    network
+        A network of the same kind of bus.
+    model
+        Name of the timing model.
+    """
+    most = most_nodes(with_nodes, limits_with_time(network, model=model))
+    if model != network.bus.deciding_model:
+        return most, None
+    # No more nodes are shown to fit than fit.
+    ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else plain(most.nodes)) + 1
+    return most, most_nodes(with_nodes, limits_to_be_safe(network), ceiling=min(ceiling, MAX_COUNT))
 
 
-def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_COUNT) -> MostNodes:
+def most_nodes(
+    with_nodes: Callable[[Number], Network], limits: Sequence[Limit], *, ceiling: int = MAX_COUNT
+) -> MostNodes:
     """Find the largest number of nodes that keeps every limit; of several limits that set it, the first is named.
 
     Each limit is tried by itself, cheap ones first, and only up to what the limits before it allow.
 
     Parameters
     ----------
-    network
-        Its own number of nodes plays no part. Its numbers may be arrays.
+    with_nodes
+        The network with a number of nodes. Its numbers may be arrays.
     limits
         The limits. Their values must not fall as nodes are added.
     ceiling
         No answer is larger [1].
     """
     nodes: Number = ceiling
-    # Limits tried at the same ceiling share one network, whose parts are computed once.
-    cached_network = lru_cache(maxsize=1)(network.with_nodes)
     most: dict[int, Number] = {}
-    for index in sorted(range(len(limits)), key=lambda index: limits[index].is_slow):
+    order = sorted(range(len(limits)), key=lambda index: limits[index].is_slow)
+    for place, index in enumerate(order):
         # One above the ceiling, so that a limit that allows the ceiling is not taken for the limit that sets it.
         still_allowed = int(nodes.max() if hasattr(nodes, "max") else plain(nodes))
-        most[index] = _most_within(limits[index], network, cached_network, still_allowed + 1)
+        most[index] = _most_within(limits[index], with_nodes, still_allowed + 1)
         nodes = smaller(nodes, most[index])
+        if is_everywhere(nodes < 1) and index < min(order[place + 1 :], default=index):
+            break  # no other would be named
     first: Number = len(limits) - 1  # time, if no limit binds
-    for index in reversed(range(len(limits))):
+    for index in sorted(most, reverse=True):
         first = choose(most[index] <= nodes, index, first)
-    return MostNodes(nodes, first)
+    return MostNodes(nodes, first, limits)
 
 
-_VALUE_COST: Final = 30
-"""Rough number of operations for the value of a limit, for each element; a comparison takes one."""
+_HUGE: Final = 1e300
+"""A finite number beyond every excess."""
+_HALVED_EVERY: Final = 3
+"""One step of a search in so many halves the range, whatever the values say."""
 
 
-def _most_within(limit: Limit, network: Network, cached_network: Callable[[int], Network], ceiling: int) -> Number:
+def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
     """The largest number of nodes that keeps one limit; every larger number breaks it.
 
-    The cheaper of two ways is taken. A value that varies along few dimensions of an array is computed for every number
-    of nodes, and the numbers that keep the limit are counted. Otherwise the number of nodes is found by bisection.
+    A value grows almost as the nodes do: the next number tried lies on the line between the last two.
     """
-    over = limit.is_broken(cached_network(ceiling))
-    elements = _size(over)
-    if not (over.any() if hasattr(over, "any") else over):
+    over = limit.excess(with_nodes(ceiling))
+    if is_everywhere(over <= 0):
         return ceiling
-    if elements > 1:
-        varying = _size(limit.least_value(network.with_nodes(1)))
-        counted = ceiling * (varying * _VALUE_COST + elements)
-        if counted <= ceiling.bit_length() * elements * _VALUE_COST:
-            broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
-            return total(choose(is_over, 0, 1) for is_over in broken)
-    low, high = choose(over, 0, ceiling), choose(over, ceiling - 1, ceiling)
-    for _ in range((ceiling - 1).bit_length()):
-        middle = larger(rounded_up((low + high) / 2), 1)
-        over = limit.is_broken(network.with_nodes(middle))
-        low, high = choose(over, low, middle), choose(over, middle - 1, high)
-    return low
-
-
-def _size(number: Number) -> int:
-    return int(getattr(number, "size", 1))
+    # `low` nodes keep the limit, `high` nodes break it.
+    low, high = choose(over > 0, 0, ceiling), choose(over > 0, ceiling, ceiling + 1)
+    low_over: Number = -inf
+    high_over, tried = choose(over > 0, over, inf), 1
+    for step in count(1):
+        over = limit.excess(with_nodes(tried))
+        is_over = over > 0
+        low, low_over = choose(is_over, low, tried), choose(is_over, low_over, over)
+        high, high_over = choose(is_over, tried, high), choose(is_over, over, high_over)
+        if is_everywhere(high - low <= 1):
+            break
+        span = high_over - low_over
+        share = 0.5 if step % _HALVED_EVERY == 0 else choose(span < _HUGE, -low_over / smaller(span, _HUGE), 0.5)
+        tried = larger(low + 1, smaller(high - 1, rounded_down(low + (high - low) * share)))
+    return smaller(low, ceiling)
 
 
 COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
@@ -154,6 +192,14 @@ class GroupCapacity:
     """Their axes."""
     safe_limited_by: str | None
     """Key of the limit that keeps `safe_nodes` from being more."""
+
+    @classmethod
+    def of(cls, group: ProfileGroup, most: tuple[int, str], safe: tuple[int, str] | None) -> Self:
+        """The capacity of a group, from its counts: nodes, and the key of the limit."""
+        nodes, axes = int(group.nodes), group.node.axes
+        safe_nodes, safe_limit = safe or (None, None)
+        safe_axes = None if safe_nodes is None else axes * safe_nodes
+        return cls(group.name, nodes, nodes * axes, most[0], axes * most[0], most[1], safe_nodes, safe_axes, safe_limit)
 
 
 @dataclass(frozen=True)
@@ -247,8 +293,11 @@ class CapacityFigures(FitFigures):
 
 def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
     """Whether a network fits its own period under one timing model, and how many nodes would."""
-    fit = figures(network, model=model)
-    counts = node_counts(network, model=model)
+    return with_counts(figures(network, model=model), node_counts(network, model=model))
+
+
+def with_counts(fit: FitFigures, counts: tuple[GroupCapacity, ...]) -> CapacityFigures:
+    """The figures together with the counts of each group."""
     if not counts or counts[0].name:
         return CapacityFigures(**vars(fit), counts=counts, groups=counts)
     return CapacityFigures(**vars(fit), counts=counts, **{key: getattr(counts[0], key) for key in COUNTS})
@@ -256,17 +305,58 @@ def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
 
 def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
-    decides = model == network.bus.deciding_model
-    counts = []
-    for group in network.profile.node_groups:
-        most, limit = _nodes_within(network.varying(group.name), limits_with_time(network, model=model))
-        safe, safe_limit = safe_nodes(network, group=group.name) if decides else (None, None)
-        nodes, axes = int(group.nodes), group.node.axes
-        safe_axes = None if safe is None else axes * safe
-        counts.append(
-            GroupCapacity(group.name, nodes, nodes * axes, most, axes * most, limit, safe, safe_axes, safe_limit)
-        )
-    return tuple(counts)
+    groups = network.profile.node_groups
+    if len(groups) < _MANY_GROUPS or not has_arrays(network):
+        found = (most_and_safe_nodes(network.varying(group.name).with_nodes, network, model=model) for group in groups)
+        words = [(most.words, safe and safe.words) for most, safe in found]
+    else:
+        words = _words_of_each(network, model=model)
+    return tuple(GroupCapacity.of(group, *counts) for group, counts in zip(groups, words, strict=True))
+
+
+def has_arrays(network: Network) -> bool:
+    """Whether its limits are computed for many numbers of nodes at once, in arrays, and not point by point."""
+    is_slow = any(limit.is_slow for limit in network.bus.limits) or any(group.is_slower for group in network.groups)
+    return not is_slow
+
+
+Counts: TypeAlias = tuple[tuple[int, str], tuple[int, str] | None]
+"""Most nodes that fit and the key of the limit, and the same to be shown to fit."""
+_MANY_GROUPS: Final = 16
+"""From so many groups on, arrays are faster than plain numbers."""
+_GROUPS_AT_ONCE: Final = 512
+
+
+def _words_of_each(network: Network, *, model: str) -> list[Counts]:
+    """The counts of each group, the others as they are: a group is a point of an array."""
+    import numpy as np
+
+    words: list[Counts] = []
+    number = len(network.names)
+    for start in range(0, number, _GROUPS_AT_ONCE):
+        places = np.arange(start, min(start + _GROUPS_AT_ONCE, number))
+        found = most_and_safe_nodes(partial(_with_nodes_of_one, network, places), network, model=model)
+        words += counts_at(found, len(places))
+    return words
+
+
+def counts_at(found: tuple[MostNodes, MostNodes | None], points: int) -> list[Counts]:
+    """Counts at each point of arrays."""
+    most, safe = found
+    return [*zip(most.words_at(points), safe.words_at(points) if safe else [None] * points, strict=True)]
+
+
+def _with_nodes_of_one(network: Network, places: "NDArray[np.int_]", nodes: Number) -> Network:
+    """The network with another number of nodes of one group, at each point of another: `places` are their indices."""
+    groups, place = [], 0
+    for group in network.groups:
+        counts: list[Number] = []
+        for member in group.members:
+            is_varied = places[0] <= place <= places[-1]
+            counts.append(choose(places == place, nodes, member.nodes) if is_varied else member.nodes)
+            place += 1
+        groups.append(group._replace(nodes=total(counts)))
+    return network._replace(groups=tuple(groups))
 
 
 def figures(network: Network, *, model: str) -> FitFigures:

@@ -23,12 +23,12 @@ from busplan.questions.base.arguments import ProfileLike, load_network, require_
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
-from busplan.questions.fit.figures import figures, limits_behind, safe_nodes, shortest_period_us
-from busplan.questions.fit.network import PERIOD, OfNetwork, at_period, changed, varied_nodes
+from busplan.questions.fit.figures import FitFigures, figures, limits_behind, safe_nodes, shortest_period_us
+from busplan.questions.fit.grid import AXES, Setting, setting_at
+from busplan.questions.fit.network import PERIOD, OfNetwork, at_period, varied_nodes
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (
     MOST_CIRCLES_UNASKED,
-    Point,
     require_executor,
     run_points,
 )
@@ -36,8 +36,6 @@ from busplan.questions.sweep.grid import require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
-AXES: Final = "axes"
-"""Key of a direction along the number of motion axes. It is no key of a profile: it sets the number of nodes."""
 MOST_VALUES: Final = 64
 """Most values of a direction, enough for every gap count of IEEE 1394: more do not fit into 80 columns."""
 
@@ -241,32 +239,78 @@ def map_(
         across, up = direction(network.profile, x, name="x", with_circle=circle), None
     else:
         across, up = directions(network, x, y, with_circle=circle)
-    values_up = (None,) if up is None else up.values
-    settings = {
-        (row, column): setting_at(
-            network, {across.key: value_x} | ({up.key: value_y} if up and value_y is not None else {})
-        )
-        for row, value_y in enumerate(values_up)
-        for column, value_x in enumerate(across.values)
+    possible = settings_of(network, across, up)
+    found = {
+        place: figures(setting.network, model=network.bus.deciding_model)
+        for place, setting in possible.settings.items()
     }
-    possible = {place: setting for place, setting in settings.items() if isinstance(setting, Variant)}
-    if not possible:
-        raise BusplanError(f"no setting of this map can exist: {next(iter(settings.values()))}")
+    return map_of(possible, found, circle=circle, executor=executor, progress=progress)
+
+
+class Grid(NamedTuple):
+    """The settings of a map."""
+
+    network: Network
+    x: Direction
+    y: Direction | None
+    settings: Mapping["_Place", Setting]
+    """Those that a profile can have, by row and column."""
+    refused: Mapping["_Place", str]
+    """Reason why there is none at the other places."""
+
+    def values_at(self, place: "_Place") -> tuple[Value, Value | None]:
+        """Values along x and y."""
+        row, column = place
+        return self.x.values[column], None if self.y is None else self.y.values[row]
+
+
+def settings_of(network: Network, x: Direction, y: Direction | None) -> Grid:
+    """The settings of two directions.
+
+    Raises
+    ------
+    BusplanError
+        No setting can exist.
+    """
+    settings: dict[_Place, Setting] = {}
+    refused: dict[_Place, str] = {}
+    for row, value_y in enumerate((None,) if y is None else y.values):
+        for column, value_x in enumerate(x.values):
+            values = {x.key: value_x} | ({y.key: value_y} if y is not None and value_y is not None else {})
+            setting = setting_at(network, values)
+            if isinstance(setting, Setting):
+                settings[row, column] = setting
+            else:
+                refused[row, column] = setting
+    if not settings:
+        raise BusplanError(f"no setting of this map can exist: {next(iter(refused.values()))}")
+    return Grid(network, x, y, settings, refused)
+
+
+def map_of(
+    grid: Grid,
+    found: Mapping["_Place", FitFigures],
+    *,
+    circle: bool,
+    executor: Executor | None,
+    progress: Progress,
+) -> MapAnswer:
+    """The map of a grid from the figures under the model that decides, with circle tests where they are asked for."""
+    network = grid.network
     cells = {
-        (row, column): _cell(setting.network, x=across.values[column], y=values_up[row])
-        for (row, column), setting in possible.items()
+        place: _cell(setting.network, found[place], *grid.values_at(place)) for place, setting in grid.settings.items()
     }
     if circle:
-        fitting = {place: possible[place] for place, cell in cells.items() if cell.state == FITS}
+        fitting = {place: grid.settings[place] for place, cell in cells.items() if cell.state == FITS}
         cells |= _with_circles(network.profile, fitting, cells, executor=executor, progress=progress)
     rows = tuple(
         tuple(
-            cells[row, column] if (row, column) in cells else NotDrawn(value_x, value_y, str(settings[row, column]))
-            for column, value_x in enumerate(across.values)
+            cells.get((row, column)) or NotDrawn(*grid.values_at((row, column)), grid.refused[row, column])
+            for column in range(len(grid.x.values))
         )
-        for row, value_y in enumerate(values_up)
+        for row in range(1 if grid.y is None else len(grid.y.values))
     )
-    return MapAnswer(network, across, up, rows, circle)
+    return MapAnswer(network, grid.x, grid.y, rows, circle)
 
 
 def directions(network: Network, x: Along | None, y: Along | None, *, with_circle: bool) -> tuple[Direction, Direction]:
@@ -375,49 +419,8 @@ def design_value(key: str, network: Network) -> Any:
     return int(plain(network.axes)) if key == AXES else value_at(network.profile, key)
 
 
-class Variant(NamedTuple):
-    """One combination of values that a profile can have."""
-
-    changes: Point
-    """New values by key of the profile."""
-    network: Network
-    """The network with them."""
-
-
-def setting_at(network: Network, values: Mapping[str, Value]) -> Variant | str:
-    """The network with a value of each direction, or why there is none."""
-    changes: Point = {key: value for key, value in values.items() if key != AXES}
-    try:
-        if AXES in values:
-            # The other value may change how many nodes it takes for these axes.
-            nodes_key = varied_nodes(network.profile).nodes_key
-            changes[nodes_key] = _nodes_with(values[AXES], changed(network, changes), nodes_key=nodes_key)
-        return Variant(changes, changed(network, changes))
-    except BusplanError as error:
-        return error.problems[0]
-
-
-def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
-    """Number of varied nodes with which the whole network has so many axes [1].
-
-    Raises
-    ------
-    BusplanError
-        No whole number of nodes has so many axes.
-    """
-    varied = next(nodes for nodes in network.profile.node_groups if nodes.nodes_key == nodes_key)
-    node_axes = int(varied.node.axes)
-    other_axes = int(plain(network.axes)) - int(varied.nodes) * node_axes
-    varied_axes = axes - other_axes if isinstance(axes, int) else 0
-    if varied_axes < max(node_axes, 1) or not node_axes or varied_axes % node_axes:
-        beside = f" beside {other_axes} others" if other_axes else ""
-        raise BusplanError(f"axes = {axes}: no whole number of nodes, with {node_axes} axes each{beside}")
-    return varied_axes // node_axes
-
-
-def _cell(network: Network, *, x: Value, y: Value | None) -> Cell:
+def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
     """The verdict of `capacity` at a setting, before any circle test."""
-    fit = figures(network, model=network.bus.deciding_model)
     unsafe = tuple(limit.key for limit in network.bus.limits if limit.role == "safety" and limit.is_broken(network))
     verdict: Any = fit.verdict  # there is one under the timing model that decides
     state: State = verdict
@@ -448,7 +451,7 @@ _Place = tuple[int, int]
 
 def _with_circles(
     profile: Profile,
-    settings: Mapping[_Place, Variant],
+    settings: Mapping[_Place, Setting],
     cells: Mapping[_Place, Cell],
     *,
     executor: Executor | None,

@@ -47,8 +47,9 @@ from busplan.forms.numbers import period_value, sentence_text, with_unit
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.fit.certainty import FITS, TIME
+from busplan.questions.fit.grid import AXES
 from busplan.questions.fit.network import PERIOD, varied_nodes
-from busplan.questions.map import AXES, Cell, Direction, MapAnswer, NotDrawn, Region, State
+from busplan.questions.map import Cell, Direction, MapAnswer, NotDrawn, Region, State
 from busplan.questions.sweep.digest import payload_sentences
 from busplan.sections.profile import Profile
 

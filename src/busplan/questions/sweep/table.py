@@ -14,7 +14,7 @@ import numpy as np
 
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Figure, Sort, by_key
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.network import Network
 from busplan.elementwise import Number
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -26,12 +26,10 @@ from busplan.questions.fit.certainty import (
     certainty,
     fits_in,
     limit_codes,
-    limits_to_be_safe,
-    limits_with_time,
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.figures import COUNTS, certainty_numbers, most_nodes, numeric_figures
+from busplan.questions.fit.figures import COUNTS, MostNodes, certainty_numbers, most_and_safe_nodes, numeric_figures
 from busplan.questions.fit.network import network_of, varied_nodes
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
 from busplan.questions.sweep.grid import Array, Columns, Grid, axis_values, checked_grid, grid_models
@@ -188,7 +186,6 @@ def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
     cycle = bus.cycle(network, model=model)
     figures = numeric_figures(cycle)
     terms = {term.key: term.us if network.groups else inf for term in cycle.terms}
-    limits = limits_with_time(network, model=model)
     late = np.logical_not(np.asarray(fits_in(figures["required_us"], available_us=figures["available_us"])))
     codes = limit_codes(network)
     broken = {**_where(codes, BROKEN), TIME: late}
@@ -200,7 +197,7 @@ def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
         else _objects([None]),
         "exceeded": _sets(broken),
         **(_certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED),
-        **_counts(network, limits, model=model, group=group),
+        **_counts(network, model=model, group=group),
     }
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
     return {key: words[key] if key in words else _number(numbers[key], sorts[key]) for key in figure_names(network)}
@@ -233,7 +230,7 @@ def _number(number: Number | None, sort: Sort) -> Array:
     return np.where(np.isinf(array), np.nan, array) if sort == "number" else array
 
 
-def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str) -> dict[str, Array]:
+def _counts(network: Network, *, model: str, group: str) -> dict[str, Array]:
     """How many nodes fit: of each group, and of the whole where one group varies and the others are as they are."""
     if not network.groups:
         return {
@@ -241,7 +238,7 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str
             "limited_by": _objects([None]),
             "safe_limited_by": _objects([None]),
         }
-    counts = {name: _counts_of(network.varying(name), limits, model=model) for name in network.names}
+    counts = {name: _counts_of(network.varying(name), model=model) for name in network.names}
     whole = counts[group]
     if network.is_uniform:
         return whole
@@ -259,24 +256,21 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str
     return {**whole, **{key: column.astype(whole[key].dtype) for key, column in more.items()}, **of_groups}
 
 
-def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Array]:
-    most, axes = most_nodes(network, limits), network.varied_group.node.axes
-    counted = {
+def _counts_of(network: Network, *, model: str) -> dict[str, Array]:
+    most, safe = most_and_safe_nodes(network.with_nodes, network, model=model)
+    axes = network.varied_group.node.axes
+    return {
         "max_nodes": _number(most.nodes, "count"),
         "max_axes": _number(axes * most.nodes, "count"),
-        "limited_by": _chosen([limit.key for limit in limits], np.asarray(most.limit, int)),
+        "limited_by": _limit_keys(most),
+        "safe_nodes": _number(safe.nodes, "count") if safe else _NO_NUMBER,
+        "safe_axes": _number(axes * safe.nodes, "count") if safe else _NO_NUMBER,
+        "safe_limited_by": _limit_keys(safe) if safe else _objects([None]),
     }
-    if model != network.bus.deciding_model:
-        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _objects([None])}
-    to_be_safe = limits_to_be_safe(network)
-    # No more nodes are shown to fit than fit.
-    safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
-    return {
-        **counted,
-        "safe_nodes": _number(safe.nodes, "count"),
-        "safe_axes": _number(axes * safe.nodes, "count"),
-        "safe_limited_by": _chosen([limit.key for limit in to_be_safe], np.asarray(safe.limit, int)),
-    }
+
+
+def _limit_keys(most: MostNodes) -> Array:
+    return _chosen([limit.key for limit in most.limits], np.asarray(most.limit, int))
 
 
 def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Array]:
