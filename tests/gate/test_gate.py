@@ -116,10 +116,10 @@ def test_the_circle_is_tested_for_profiles_that_ask_and_when_asked(clean: str, c
 def test_a_margin_that_only_the_default_asks_for_stands_at_the_gain(clean: str, check: Check) -> None:
     little = clean + "\n[circle]\nradius_mm = 25\n[servo]\nstep_us = 100\nposition_gain_per_s = 14000\n"
     (finding,) = check(little).findings
-    assert (finding.code, finding.key, finding.line) == ("BP202", "servo.position_gain_per_s", 30)
+    assert (finding.code, finding.key, finding.line) == ("BP202", "servo.position_gain_per_s", 31)
     assert "margin" in finding.message
     (said,) = check(little + "[tolerance]\nmin_gain_margin_db = 6\n").findings
-    assert (said.key, said.line) == ("tolerance.min_gain_margin_db", 32)
+    assert (said.key, said.line) == ("tolerance.min_gain_margin_db", 33)
 
 
 def test_a_cycle_that_does_not_fit_has_no_circle(changed: Changed, check: Check) -> None:
@@ -157,7 +157,7 @@ def test_limits_at_their_edge_are_held(changed: Changed, check: Check) -> None:
         assert [one.code for one in check(text).findings] == codes
     nothing = check(changed(more="\n[limits]\nmax_utilisation = 0\n"))
     assert nothing.findings[0].message.endswith(
-        "no change of gap count, slice ratio and period is a cure: limits.max_utilisation = 0 leaves no time"
+        "no change of gap count, slice ratio, responses, schedule and period is a cure: limits.max_utilisation = 0 leaves no time"
     )
 
 
@@ -259,8 +259,8 @@ def test_problems_that_are_not_listed_are_counted(check: Check) -> None:
 @pytest.mark.parametrize(
     ("section", "place"),
     [
-        ("[servo]\nstep_us = 100", (26, "servo")),
-        ("[circle]\nramp_periods = 10", (26, "circle")),
+        ("[servo]\nstep_us = 100", (27, "servo")),
+        ("[circle]\nramp_periods = 10", (27, "circle")),
         ("[tolerance]\nmax_contour_error_mm = 1", (1, "circle")),
     ],
 )
