@@ -57,7 +57,7 @@ class Protocol(Section):
         examples=[True],
     )
     clock_tolerance: Tolerance = Field(
-        default_factory=lambda: c["SHARES[CLOCK_TOLERANCE]"],
+        default_factory=lambda: float(c["SHARES[CLOCK_TOLERANCE]"]),
         description="Largest error of the bit rate, a share of it",
         examples=[0.01],
     )
