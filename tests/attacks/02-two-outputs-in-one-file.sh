@@ -1,7 +1,7 @@
-# Row 2: rows and their figure, by two names of one file that is not there yet.
+# Row 2: the answer and its trace, by two names of one file that is not there yet.
 # exits: 2
-# says: --output a\.svg and --plot b\.svg: the same file
-ln -s a.svg b.svg
-busplan sweep p.toml --vary bus.nodes=1:3 --format csv -o a.svg --plot b.svg
+# says: --output a\.csv and --trace b\.csv: the same file
+ln -s a.csv b.csv
+busplan circle-test p.toml -o a.csv --trace b.csv
 code=$?
-test ! -e a.svg && exit $code
+test ! -e a.csv && exit $code

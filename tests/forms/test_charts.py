@@ -22,9 +22,9 @@ ANSWERS: Mapping[str, Callable[[], Any]] = {
     "timeline": lambda: busplan.timeline("paper-1ms"),
     "transaction": lambda: busplan.timeline("paper-1ms", transaction="read:1"),
     "sensitivity": lambda: busplan.capacity("gantry-24", sensitivity=True),
-    "curves": lambda: busplan.sweep("paper-1ms", vary={"bus.nodes": range(1, 17)}),
-    "colours": lambda: busplan.sweep(
-        "paper-1ms", vary={"bus.gap_count": [5, 7, "optimal"], "cycle.period_us": range(250, 4001, 250)}
+    "curves": lambda: busplan.map_("paper-1ms", x={"bus.nodes": range(1, 17)}),
+    "words": lambda: busplan.map_(
+        "paper-1ms", x={"bus.gap_count": [5, 7, "optimal"]}, y={"cycle.period_us": range(250, 4001, 250)}
     ),
     "circle": lambda: busplan.circle_test("dvrk", contributions=True),
 }

@@ -273,9 +273,9 @@ def test_a_text_that_no_spreadsheet_takes_says_so_in_its_cell() -> None:
 
 
 def test_a_figure_below_zero_has_the_decimals_of_one_above(run: Callable[..., Any]) -> None:
-    shown = run("capacity", "paper-4ms", "--period", "500us").stdout
-    assert re.search(r"^corrected margin +us +- +-19\.936 !$", shown, re.MULTILINE)
-    assert re.search(r"^margin +us +42\.883 +-13\.320 !$", shown, re.MULTILINE)
+    shown = run("capacity", "paper-4ms", "--period", "500us", "--all").stdout
+    assert re.search(r"^corrected margin +JCGM 100 +us +-19\.936 ! +-$", shown, re.MULTILINE)
+    assert re.search(r"^margin +\(1\) \(2\) +us +-13\.320 ! +42\.883$", shown, re.MULTILINE)
     # What has no digit among them is written with three of its own, of either sign.
     assert [decimals_of(number, 3) for number in (-0.00012, 0.00012, -0.001, -123.4)] == [
         "-0.00012", "0.00012", "-0.001", "-123.400",

@@ -136,6 +136,7 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
             "verdict",
             "margin_corrected_us",
             "uncertainty_us",
+            "rests_on",
             "findings",
             "suppressed",
         }
@@ -343,7 +344,7 @@ def test_github_commands_say_file_line_and_message(mixed: Answer) -> None:
     commands = [github_command(line) for line in render(mixed, file_format="github").splitlines()]
     assert [(level, one["file"], one["line"], one["col"]) for level, one, _ in commands] == [
         ("warning", "p/fails.toml", "7", "1"),
-        ("error", "p/fails.toml", "11", "1"),
+        ("error", "p/fails.toml", "12", "1"),
         ("error", "p/broken.toml", "1", "4"),
     ]
     assert commands[0][1]["title"] == "BP110 gap-count-wasteful"
@@ -379,7 +380,7 @@ def test_gitlab_issues_have_what_its_report_needs(mixed: Answer) -> None:
     issues = json.loads(render(mixed, file_format="gitlab"))
     assert [(one["check_name"], one["severity"], one["location"]) for one in issues] == [
         ("gap-count-wasteful", "minor", {"path": "p/fails.toml", "lines": {"begin": 7}}),
-        ("slice-overrun", "major", {"path": "p/fails.toml", "lines": {"begin": 11}}),
+        ("slice-overrun", "major", {"path": "p/fails.toml", "lines": {"begin": 12}}),
         ("syntax", "major", {"path": "p/broken.toml", "lines": {"begin": 1}}),
     ]
     assert all(set(one) == {"description", "check_name", "fingerprint", "severity", "location"} for one in issues)
@@ -415,7 +416,7 @@ def test_junit_has_one_case_a_profile_also_when_clean(mixed: Answer) -> None:
     assert failure is not None
     assert failure.attrib["type"] == "BP101"
     assert failure.attrib["message"].startswith("cycle.period_us: the cycle needs")
-    assert (failure.text or "").startswith("p/fails.toml:11:1: BP101 ")
+    assert (failure.text or "").startswith("p/fails.toml:12:1: BP101 ")
     assert (cases[1].findtext("system-out") or "").startswith("p/fails.toml:7:1: BP110 ")
 
 

@@ -23,7 +23,7 @@ def places(result: Any) -> list[tuple[int, int, str]]:
 
 def test_findings_stand_in_the_order_of_places(changed: Changed, check: Check) -> None:
     text = changed(
-        ('"optimal"', "63"), ("period_us = 4000", "period_us = 300"), ("read_bytes = 12", "read_bytes = 13"),
+        ('"optimal"', "63"), ("period_us = 4000", "period_us = 100"), ("read_bytes = 12", "read_bytes = 13"),
         ('"measured"', '"assumed"'),
         more="\n[limits]\nmin_spare_axes = 100\nmin_spare_nodes = 20\nmax_utilisation = 0.1\n",
     )  # fmt: skip
@@ -116,10 +116,10 @@ def test_the_circle_is_tested_for_profiles_that_ask_and_when_asked(clean: str, c
 def test_a_margin_that_only_the_default_asks_for_stands_at_the_gain(clean: str, check: Check) -> None:
     little = clean + "\n[circle]\nradius_mm = 25\n[servo]\nstep_us = 100\nposition_gain_per_s = 14000\n"
     (finding,) = check(little).findings
-    assert (finding.code, finding.key, finding.line) == ("BP202", "servo.position_gain_per_s", 30)
+    assert (finding.code, finding.key, finding.line) == ("BP202", "servo.position_gain_per_s", 31)
     assert "margin" in finding.message
     (said,) = check(little + "[tolerance]\nmin_gain_margin_db = 6\n").findings
-    assert (said.key, said.line) == ("tolerance.min_gain_margin_db", 32)
+    assert (said.key, said.line) == ("tolerance.min_gain_margin_db", 33)
 
 
 def test_a_cycle_that_does_not_fit_has_no_circle(changed: Changed, check: Check) -> None:
@@ -157,7 +157,8 @@ def test_limits_at_their_edge_are_held(changed: Changed, check: Check) -> None:
         assert [one.code for one in check(text).findings] == codes
     nothing = check(changed(more="\n[limits]\nmax_utilisation = 0\n"))
     assert nothing.findings[0].message.endswith(
-        "no change of gap count, slice ratio and period is a cure: limits.max_utilisation = 0 leaves no time"
+        "no change of gap count, slice ratio, responses, schedule and period is a cure: "
+        "limits.max_utilisation = 0 leaves no time"
     )
 
 
@@ -165,10 +166,11 @@ def test_limits_at_their_edge_are_held(changed: Changed, check: Check) -> None:
     ("gap_count", "limit", "cure"),
     [
         # 253.187 us at gap count 63 and 177.992 us at 7, of 2000 us; shares are rounded up to hundredths.
+        # Of 3600 us, 1 % is 36 us: a node executes for 34.2 us, and packets take the rest and more.
         ("63", 0.1, "bus.gap_count = 7"),
         ('"optimal"', 0.08, "cycle.slice_ratio = 0.56"),
         ("63", 0.06, "cycle.slice_ratio = 0.75, bus.gap_count = 7"),
-        ("63", 0.04, "cycle.period_us = "),
+        ("63", 0.01, "cycle.period_us = "),
     ],
 )
 def test_a_full_slice_has_its_cheapest_cure(
@@ -259,8 +261,8 @@ def test_problems_that_are_not_listed_are_counted(check: Check) -> None:
 @pytest.mark.parametrize(
     ("section", "place"),
     [
-        ("[servo]\nstep_us = 100", (26, "servo")),
-        ("[circle]\nramp_periods = 10", (26, "circle")),
+        ("[servo]\nstep_us = 100", (27, "servo")),
+        ("[circle]\nramp_periods = 10", (27, "circle")),
         ("[tolerance]\nmax_contour_error_mm = 1", (1, "circle")),
     ],
 )

@@ -112,7 +112,7 @@ def test_comments_inside_arrays_are_seen(changed: Changed, check: Check) -> None
         'kind = "table"\ngrade = "measured"\npayload_bytes = [ # busplan: ignore[BP007] why\n4, 16]\ntime_us = [1, 2]'
     )
     text = changed(('kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35', table))
-    assert said(check(text)) == [("BP902", 23, 19)]
+    assert said(check(text)) == [("BP902", 24, 19)]
 
 
 def test_the_shape_of_the_file_cannot_be_suppressed(changed: Changed, check: Check) -> None:

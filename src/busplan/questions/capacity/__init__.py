@@ -132,7 +132,7 @@ def capacity(
     'fits'
     >>> answer = busplan.capacity("paper-1ms", period_us=500)
     >>> [(figures.timing_model, figures.fits, figures.max_axes) for figures in answer.results]
-    [('paper', True, 8), ('standard', False, 4)]
+    [('standard', False, 4), ('paper', True, 8)]
     >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
     (False, 'does not fit')
     >>> (sensitivity,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities

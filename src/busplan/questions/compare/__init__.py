@@ -201,7 +201,7 @@ def compare(
     >>> import busplan
     >>> answer = busplan.compare("paper-4ms", buses=["ieee1394", "can"])
     >>> [(kind.figures.verdict, kind.safe.axes, round(kind.smallest.us)) for kind in answer.kinds]
-    [('fits', 52, 553), ('fits', 16, 2126)]
+    [('fits', 52, 552), ('fits', 12, 2267)]
     >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """

@@ -85,7 +85,7 @@ def timeline(
     >>> import busplan
     >>> answer = busplan.timeline("paper-4ms", transaction=("read", 1))
     >>> [(event.kind, round(event.duration_us, 3)) for event in answer.events][1:4]
-    [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
+    [('request_data', 0.738), ('acknowledge', 0.581), ('execution', 36.733)]
     """
     network = network_of(require_cycle(load_profile(profile), question="timeline"))
     model = None if timing_model is None else checked_models([timing_model], network)[0]
