@@ -637,8 +637,9 @@ class CanCycle(BusCycle):
             of_queue, source, lower = "(L)", _QUEUES, "L"
             higher = f"of its queue and of higher priorities than L before {name}"
             said = (
-                f"the lowest priority in the queue, {int(last.last):#x} of {last.label}: {name} waits for all before it, "
-                "and comes to others R - C later (Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012)"
+                f"the lowest priority in the queue, {int(last.last):#x} of {last.label}: "
+                f"{name} waits for all before it, and comes to others R - C later "
+                "(Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012)"
             )
             identifier = self.traffic.ask(lambda _: last.last, words=said)
             behind = (named(identifier, "last_in_queue", "L", source),)
