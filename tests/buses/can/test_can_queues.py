@@ -60,8 +60,8 @@ def test_a_derivation_says_what_the_queue_does_and_who_showed_it() -> None:
     response = first["worst_response_us"]
     assert response["formula"] == "J + B(L) + I(L) + q (C - T) + C"
     assert (response["value"], response["reference"]) == (5 * 135, "Davis 2011, 2012")
-    # m1 is alone in its queue; m0 comes to it R - C late.
-    assert "last_in_queue" not in second or second["last_in_queue"]["value"] == 1
+    # m1 is alone in its queue; m0 comes to it R - C late, from its own.
+    assert second["last_in_queue"]["value"] == 1
     assert "1 m0 of 135 us, which its queue may hold up to 540 us" in second["interference_us"]["formula"]
     said = str(busplan.explain(own, "m0"))
     assert "Davis 2011, 2012  L = the lowest priority in the queue" in said
