@@ -636,9 +636,10 @@ class CanCycle(BusCycle):
         if last is not None:
             of_queue, source, lower = "(L)", _QUEUES, "L"
             higher = f"of its queue and of higher priorities than L before {name}"
+            is_late = any(message.name == name for message in self.traffic.messages)
             said = (
                 f"the lowest priority in the queue, {int(last.last):#x} of {last.label}: "
-                f"{name} waits for all before it, and comes to others R - C later "
+                f"{name} waits for all before it{', and comes to others R - C later' if is_late else ''} "
                 "(Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012)"
             )
             identifier = self.traffic.ask(lambda _: last.last, words=said)

@@ -273,10 +273,15 @@ def sync_response(traffic: Traffic) -> Response:
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    sent = _offered(traffic)
-    if sent[0].queue_place is not None:
-        sent = (sent[0], *(stream for stream in sent if stream.is_message))
+    sent = _beside_sync(_offered(traffic))
     return _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
+
+
+def _beside_sync(sent: tuple[Stream, ...]) -> tuple[Stream, ...]:
+    """What SYNC may wait for: in a queue it is behind messages alone."""
+    if sent[0].queue_place is None:
+        return sent
+    return (sent[0], *(stream for stream in sent if stream.is_message))
 
 
 @cached(maxsize=4)
@@ -327,6 +332,8 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """
     answered, worst = responses(traffic)[place]
     higher, blocking, sent = [], "", _offered(traffic)
+    if answered.name == SYNC:
+        sent = _beside_sync(sent)
     for stream in arriving(sent, answered.end_place):
         if (stream.block if answered.is_message else stream.first_place) <= answered.end_place:
             higher.append(stream)
