@@ -99,7 +99,7 @@ class Traced:
         The input, if it is one.
     """
 
-    __slots__ = ("formula", "given", "key", "numbers", "operation", "parts", "symbol", "value")
+    __slots__ = ("formula", "given", "key", "numbers", "operation", "parts", "reference", "symbol", "value")
 
     def __init__(
         self,
@@ -119,11 +119,12 @@ class Traced:
         self.given = given
         self.key = ""
         self.symbol = given.symbol if given else ""
+        self.reference = ""
 
-    def named(self, key: str, symbol: str) -> "Traced":
-        """Name a number, unless it has a name: it becomes a line of its own."""
+    def named(self, key: str, symbol: str, reference: str = "") -> "Traced":
+        """Name a number, unless it has a name: it becomes a line of its own, with its source where it differs."""
         if not self.symbol:
-            self.key, self.symbol = key, symbol
+            self.key, self.symbol, self.reference = key, symbol, reference
         return self
 
     __add__, __radd__ = _operators("add")
@@ -463,9 +464,12 @@ def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[
     return (point.item() for point in np.broadcast_to(number, shape).flat)
 
 
-def named(number: Number, key: str, symbol: str) -> Number:
-    """Give a step of a computation its name, for a derivation; any other number stays as it is."""
-    return number.named(key, symbol) if isinstance(number, Traced) else number
+def named(number: Number, key: str, symbol: str, reference: str = "") -> Number:
+    """Give a step of a computation its name, for a derivation; any other number stays as it is.
+
+    With `reference`, the source of this number, where it is not that of the figure with this key.
+    """
+    return number.named(key, symbol, reference) if isinstance(number, Traced) else number
 
 
 def worded(number: Number, words: str) -> Number:

@@ -1,5 +1,6 @@
 """Queues that are not by priority: what is known of them, what the verdict says, and the equality with Davis 2007."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -39,6 +40,47 @@ def test_a_message_waits_for_all_of_its_queue_and_all_that_those_wait_for() -> N
     assert found["m1"] == 3 * 135
     by_priority = responses(network({"sender": "a"}, {}, {}, {"sender": "a"}, {}))
     assert by_priority["m0"] == 2 * 135
+
+
+def test_a_derivation_says_what_the_queue_does_and_who_showed_it() -> None:
+    own = network({"sender": "a"}, {"sender": "b"}, {"sender": "c"}, {"sender": "a"}, {"sender": "d"}, queue="fifo")
+    first, second = (
+        {step["key"]: step for step in busplan.explain(own, name).to_dict()["derivations"][0]["steps"]}
+        for name in ("m0", "m1")
+    )
+    queue = first["last_in_queue"]
+    assert (queue["symbol"], queue["value"]) == ("L", 3)
+    assert "the lowest priority in the queue, 0x3 of m3: m0 waits for all before it" in queue["formula"]
+    assert "Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012" in queue["formula"]
+    assert first["blocking_us"]["formula"] == "the longest frame of a lower priority than L: m4"
+    assert first["interference_us"]["formula"] == (
+        "frames of its queue and of higher priorities than L before m0, in its worst instance: "
+        "1 m1 of 135 us, 1 m2 of 135 us, 1 m3 of 135 us"
+    )
+    response = first["worst_response_us"]
+    assert response["formula"] == "J + B(L) + I(L) + q (C - T) + C"
+    assert (response["value"], response["reference"]) == (5 * 135, "Davis 2011, 2012")
+    # m1 is alone in its queue; m0 comes to it R - C late, from its own.
+    assert second["last_in_queue"]["value"] == 1
+    assert "1 m0 of 135 us, which its queue may hold up to 540 us" in second["interference_us"]["formula"]
+    said = str(busplan.explain(own, "m0"))
+    assert "Davis 2011, 2012  L = the lowest priority in the queue" in said
+    assert "; Davis 2011, 2012.\n" in said
+    assert "higher priorities before m0" in str(busplan.explain(network({}, {}, queue="priority"), "m0").to_dict())
+
+
+def test_a_derivation_starts_with_the_inputs_of_the_messages_that_it_counts(tmp_path: Path) -> None:
+    lines = ["schema_version = 1", 'name = "own"', "[bus]", 'kind = "can"', "bit_rate_kbit_s = 1000 # assumed"]
+    for name, identifier, size in (("high", 1, 8), ("mid", 2, 8), ("longest", 3, 8), ("short", 4, 1)):
+        keys = ("[[message]]", f'name = "{name}"', f"identifier = {identifier}", f"payload_bytes = {size}")
+        lines += [*keys, "period_us = 10000 # assumed"]
+    path = tmp_path / "own.toml"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    answer = busplan.explain(path, "mid")
+    periods = [f"message.{name}.period_us" for name in ("high", "mid", "longest", "short")]
+    assert [name in str(answer) for name in periods] == [True, True, True, False]
+    inputs = [given["name"] for given in answer.to_dict()["derivations"][0]["inputs"]]
+    assert set(periods) <= set(inputs)
 
 
 def test_what_was_held_up_in_a_queue_comes_twice_in_short_time() -> None:

@@ -310,17 +310,21 @@ def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
     assert len(set(swept["fits"])) > 1
 
 
-@pytest.mark.parametrize("errors", [{}, {"bus.error_period_us": 1500, "bus.error_burst": 2}], ids=["none", "errors"])
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"bus.error_period_us": 1500, "bus.error_burst": 2}, {"bus.queue": "fifo"}],
+    ids=["none", "errors", "queues"],
+)
 @pytest.mark.parametrize("profile", ["can-servo-8", "canopen-6", "can-fd-arm-7"])
-def test_a_derivation_lists_the_frames_that_were_counted(profile: str, errors: dict[str, int]) -> None:
-    derivations = busplan.explain(busplan.load_profile(profile, changes=errors), "worst_response_us").to_dict()[
+def test_a_derivation_lists_the_frames_that_were_counted(profile: str, changes: dict[str, Any]) -> None:
+    derivations = busplan.explain(busplan.load_profile(profile, changes=changes), "worst_response_us").to_dict()[
         "derivations"
     ]
     assert len(derivations) > 5
     for one in derivations:
         for step in one["steps"]:
             before, _, listed = step["formula"].partition(", in its worst instance")
-            if not before.startswith("frames of higher priorities before "):
+            if not before.startswith(("frames of higher priorities before ", "frames of its queue and of higher")):
                 continue
             frames = re.findall(r"(\d+) [\w -]+ of ([\d.]+) us", listed)
             assert sum(int(number) * float(us) for number, us in frames) == pytest.approx(step["value"])

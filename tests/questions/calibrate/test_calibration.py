@@ -217,8 +217,8 @@ def test_a_payload_that_no_packet_carries_is_refused(make: Make) -> None:
         run(make(bus__speed="S100"), [(513, 500.0)])
 
 
-def test_the_profile_gives_the_distance_and_the_bus_the_model(make: Make) -> None:
-    near, far = (run(make(bus__nodes=nodes, bus__timing_model="paper"), [(12, 60)]) for nodes in (1, 8))
+def test_the_profile_gives_the_distance_and_the_model_is_the_one_that_decides(make: Make) -> None:
+    near, far = (run(make(bus__nodes=nodes), [(12, 60)]) for nodes in (1, 8))
     assert near.timing_model == "standard"
     assert near.payloads[0].packets_us < far.payloads[0].packets_us
 

@@ -43,7 +43,7 @@ def test_an_unknown_uncertainty_is_null_and_no_zero(run: Run) -> None:
     assert busplan.capacity("sercos3-servo-8").verdicts[0].deciding.uncertainty_us is not None
     words = ("sercos3-servo-8", "--set", "bus.ring_grade=measured")
     shown = run("capacity", *words, "--all").stdout
-    assert re.search(r"^uncertainty U +us +- +-$", shown, re.MULTILINE)
+    assert re.search(r"^uncertainty U +JCGM 100 +us +- +-$", shown, re.MULTILINE)
     assert "+/-" not in shown.partition("\n8 nodes")[0]
     (derivation,) = busplan.explain(measured, "uncertainty_us").to_dict()["derivations"]
     assert (derivation["value"], derivation["steps"][-1]["value"]) == (None, None)

@@ -31,6 +31,7 @@ from busplan.buses.can.frames import (
 from busplan.buses.can.waiting import (
     before_the_last,
     counted,
+    last_in_queue,
     message_responses,
     responses,
     sent_in,
@@ -67,6 +68,8 @@ NONE: Final[TimingModelName] = "no-stuffing"
 
 
 _DAVIS: Final = BUS_LOAD.reference
+_QUEUES: Final = "Davis 2011, 2012"
+"""Of the response in a queue that is not by priority: Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012."""
 EVENTS: Final = (
     EventKind("jitter", "SYNC's jitter", "profile", "j", "contention"),
     EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
@@ -610,8 +613,8 @@ class CanCycle(BusCycle):
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message; of no arrays."""
 
-        def figure(key: str, words: str) -> Number:
-            def of(traffic: Traffic) -> float:
+        def figure(key: str, words: str, *behind: Number) -> Number:
+            def of(traffic: Traffic, *_: Number) -> float:
                 stream, worst = responses(traffic)[place]
                 if key in Stream._fields or key == "last":
                     number: float = getattr(stream, key)
@@ -619,13 +622,28 @@ class CanCycle(BusCycle):
                     number = getattr(worst, key) if worst.us < inf else inf
                 return number
 
-            return self.traffic.ask(of, words=words)
+            return self.traffic.ask(of, *behind, words=words)
 
-        # A derivation says which frames were counted.
-        point, words = self.traffic.point, ("", "")
+        # A derivation says which frames were counted, and what a queue does that is not by priority.
+        point, words, last = self.traffic.point, ("", ""), None
         if isinstance(point, Traced):
-            words = counted(self.traffic.at(point.value), place)
+            traffic = self.traffic.at(point.value)
+            words, last = counted(traffic, place), last_in_queue(traffic, place)
         blocks, before = (f": {frames}" if frames else "" for frames in words)
+        behind: tuple[Number, ...] = ()
+        of_queue, source, lower = "", "", name
+        higher = f"of higher priorities before {name}"
+        if last is not None:
+            of_queue, source, lower = "(L)", _QUEUES, "L"
+            higher = f"of its queue and of higher priorities than L before {name}"
+            is_late = any(message.name == name for message in self.traffic.messages)
+            said = (
+                f"the lowest priority in the queue, {int(last.last):#x} of {last.label}: "
+                f"{name} waits for all before it{', and comes to others R - C later' if is_late else ''} "
+                "(Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012)"
+            )
+            identifier = self.traffic.ask(lambda _: last.last, words=said)
+            behind = (named(identifier, "last_in_queue", "L", source),)
         frame_us = figure("frame_us", f"the last frame of {name}")
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
@@ -636,12 +654,16 @@ class CanCycle(BusCycle):
         parts_us = {
             "jitter_us": named(figure("jitter_us", f"how late {name} may be queued"), "jitter_us", "J"),
             "blocking_us": named(
-                figure("blocking_us", f"the longest frame of a lower priority than {name}{blocks}"), "blocking_us", "B"
+                figure("blocking_us", f"the longest frame of a lower priority than {lower}{blocks}", *behind),
+                "blocking_us",
+                f"B{of_queue}",
+                source,
             ),
             "interference_us": named(
-                figure("interference_us", f"frames of higher priorities before {name}, in its worst instance{before}"),
+                figure("interference_us", f"frames {higher}, in its worst instance{before}", *behind),
                 "interference_us",
-                "I",
+                f"I{of_queue}",
+                source,
             ),
             "backlog_us": named(
                 choose(instance < inf, instance * frame_us - periods * period_us, instance), "backlog_us", "q (C - T)"
@@ -654,6 +676,7 @@ class CanCycle(BusCycle):
         has_deadline = not any(isinstance(each.deadline_us, str) for each in messages if each.name == name)
         return _numbered(
             parts_us,
+            source,
             identifier=figure("last", f"identifier of {name}"),
             data_bytes=figure("data_bytes", f"data of {name}"),
             instance=instance,
@@ -661,10 +684,11 @@ class CanCycle(BusCycle):
         )
 
 
-def _numbered(parts_us: Mapping[str, Number], **figures: Number) -> dict[str, Number]:
-    """The figures of a latency with the sum of its parts."""
+def _numbered(parts_us: Mapping[str, Number], source: str = "", **figures: Number) -> dict[str, Number]:
+    """The figures of a latency with the sum of its parts, and its source where it is not that of the figure."""
     deadline_us = figures.pop("deadline_us")
-    return {**figures, **parts_us, "worst_response_us": total(parts_us.values()), "deadline_us": deadline_us}
+    response_us = named(total(parts_us.values()), "worst_response_us", "R", source)
+    return {**figures, **parts_us, "worst_response_us": response_us, "deadline_us": deadline_us}
 
 
 def _short(number: float) -> str:

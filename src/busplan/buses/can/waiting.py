@@ -273,10 +273,15 @@ def sync_response(traffic: Traffic) -> Response:
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    sent = _offered(traffic)
-    if sent[0].queue_place is not None:
-        sent = (sent[0], *(stream for stream in sent if stream.is_message))
+    sent = _beside_sync(_offered(traffic))
     return _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
+
+
+def _beside_sync(sent: tuple[Stream, ...]) -> tuple[Stream, ...]:
+    """What SYNC may wait for: in a queue it is behind messages alone."""
+    if sent[0].queue_place is None:
+        return sent
+    return (sent[0], *(stream for stream in sent if stream.is_message))
 
 
 @cached(maxsize=4)
@@ -301,6 +306,20 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     return (*sync, *pdos, *message_responses(traffic))
 
 
+def last_in_queue(traffic: Traffic, place: int) -> Stream | None:
+    """The lowest priority in the queue of a response of `responses`; None where that is by priority.
+
+    Parameters
+    ----------
+    traffic
+        What is sent, in plain numbers.
+    place
+        Place of the response.
+    """
+    answered, _ = responses(traffic)[place]
+    return next((stream for stream in streams(traffic) if stream.last_place == answered.queue_place), None)
+
+
 def counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """Frames in a response of `responses`, in words: the one that blocks, and those that go before it, by number.
 
@@ -313,6 +332,8 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """
     answered, worst = responses(traffic)[place]
     higher, blocking, sent = [], "", _offered(traffic)
+    if answered.name == SYNC:
+        sent = _beside_sync(sent)
     for stream in arriving(sent, answered.end_place):
         if (stream.block if answered.is_message else stream.first_place) <= answered.end_place:
             higher.append(stream)
@@ -339,9 +360,20 @@ def counted(traffic: Traffic, place: int) -> tuple[str, str]:
         us = sum(number * stream.frame_us for number, stream in before)
         if isclose(us, worst.interference_us, abs_tol=1e-6):
             return blocking, first_of(
-                [f"{number} {stream.label} of {stream.frame_us:g} us" for number, stream in before], _LISTED
+                [
+                    f"{number} {stream.label} of {stream.frame_us:g} us{_held(stream, answered.end_place)}"
+                    for number, stream in before
+                ],
+                _LISTED,
             )
     return "", ""
+
+
+def _held(stream: Stream, end: Points) -> str:
+    """How late the queue of a stream offers it, in words; empty where it comes when it is queued."""
+    if not stream.is_message or stream.queue_place is None or stream.queue_place <= end:
+        return ""
+    return f", which its queue may hold up to {stream.jitter_us:g} us"
 
 
 _LISTED: Final = 20

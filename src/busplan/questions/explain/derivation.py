@@ -70,6 +70,11 @@ class Derivation:
     inputs: tuple[Input, ...]
 
     @property
+    def reference(self) -> str:
+        """Numbers of its equations, or another source."""
+        return self.steps[-1].reference if self.steps else self.figure.reference
+
+    @property
     def weakest_grade(self) -> str:
         """Grade of the least well known input."""
         return min((given.grade for given in self.inputs), key=GRADES.index, default=GRADES[-1])
@@ -142,7 +147,8 @@ def _derivation(
         result = figure if line is number else figures.get(line.key, Figure(line.key, line.key, "", ""))
         formula, numbers = (_INFINITE.sub("none", formula_text(line, in_numbers=way)) for way in (False, True))
         symbol = result.symbol if line is number else line.symbol
-        steps.append(Step(result.key, symbol, result.reference, formula, numbers, _existing(line.value), result.unit))
+        reference = line.reference or result.reference
+        steps.append(Step(result.key, symbol, reference, formula, numbers, _existing(line.value), result.unit))
     period_us = value_of(network.period_us) if network.groups else None
     value = _existing(number.value)
     return Derivation(command, figure, model, transaction, period_us, value, tuple(steps), tuple(inputs(number)))

@@ -144,7 +144,9 @@ def _record(derivation: Derivation) -> Record:
     return {
         "command": derivation.command,
         "figure": derivation.figure.key,
-        **fields(derivation.figure, "symbol", "unit", "reference", "meaning"),
+        **fields(derivation.figure, "symbol", "unit"),
+        "reference": derivation.reference,
+        "meaning": derivation.figure.meaning,
         **fields(derivation, "timing_model", "transaction", "period_us", "value", "weakest_grade"),
         "steps": [step._asdict() for step in derivation.steps],
         "inputs": [given._asdict() for given in derivation.inputs],
@@ -185,7 +187,7 @@ def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
     period = () if derivation.period_us is None else (" at ", period_value(derivation.period_us))
     result = _result(derivation.value, figure.key, figure.unit)
     title = Sentence((Code(figure.key), " of ", Code(name), *period, f", {_of(derivation)}: ", result))
-    about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
+    about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {derivation.reference}.",))
     steps = Calculation(tuple(map(_step, derivation.steps)))
     if len(derivation.steps) <= _MOST_STEPS and len(derivation.inputs) <= _MOST_INPUTS:
         return Chapter(title, (about, steps, below))
@@ -201,18 +203,29 @@ def _last_step(derivation: Derivation) -> Iterator[Block]:
     """The last step, the steps that it takes its numbers from, and the inputs that are known the least."""
     *before, last = derivation.steps or (None,)
     if last is not None:
-        yield Calculation((_step(last),))
         used = [step for step in before if re.search(rf"(?<!\w){re.escape(step.symbol)}(?!\w)", last.formula)]
+        # What another source than the figure's says of it, beside that source's other steps.
+        special = [step for step in used if step.reference == last.reference != derivation.figure.reference]
+        yield Calculation((*map(_step, special), _step(last)))
         rows = (
             TableRow((Code(step.symbol), _result(step.value, step.key, ""), step.unit, step.reference)) for step in used
         )
         if used:
             yield Table(_USED, tuple(rows))
-    known = (given for given in derivation.inputs if given.grade in GRADES[:-1])
+    known = (given for given in derivation.inputs if given.grade in GRADES[:-1] and _plays_a_part(given, derivation))
     weak = sorted(known, key=lambda given: GRADES.index(given.grade))[:_MOST_INPUTS]
     rows = (TableRow((Code(given.symbol), *_input_cells(given))) for given in weak)
     caption = Sentence((f"Inputs, the least well known first; the weakest grade is {derivation.weakest_grade}",))
     yield Table((_SYMBOL._replace(leaves="out"), *_KNOWN), tuple(rows), caption)
+
+
+def _plays_a_part(given: Input, derivation: Derivation) -> bool:
+    """Whether an input plays a part in a figure of a transaction: one of a message that no step names does not."""
+    section, _, rest = given.name.partition(".")
+    name = rest.rpartition(".")[0]
+    if section != "message" or derivation.transaction in (None, name):
+        return True
+    return any(re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", step.formula) for step in derivation.steps)
 
 
 def _result(value: object, key: str, unit: str) -> ShownValue | Words:
