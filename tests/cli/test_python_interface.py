@@ -48,7 +48,10 @@ WITH_THEIR_UNIT = {
 """Parameter of an option whose value has its unit; every other one has the option's name."""
 OPTIONS_ALONE: Mapping[str | tuple[str, str], str] = {
     "set": "load_profile(profile, changes=...)",
-    **{(name, "period"): "the same" for name in ("emulate", "timeline", "map", "explore", "compare", "report")},
+    **{
+        (name, "period"): "the same"
+        for name in ("latency", "emulate", "timeline", "map", "explore", "compare", "report")
+    },
     "all": "rows and columns on a terminal",
     "no_pager": "where a terminal shows it",
     "format": "save(path) goes by the ending",
