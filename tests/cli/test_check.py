@@ -201,8 +201,8 @@ def test_a_baseline_is_recorded_and_held(busplan: Busplan, folder: Path) -> None
     for path in ("p/clean.toml", "./p/clean.toml", folder / "p" / "clean.toml"):
         run = busplan("check", path, "--baseline", "b.json", cwd=folder)
         assert run.returncode == 1
-        # 14 nodes are shown to fit: 56 axes, of three each 42.
-        said = "p/clean.toml:18:1: BP301 error: node.axes: 3, was 4: safe axes fell from 56 to 42, "
+        # 12 nodes are shown to fit: 48 axes, of three each 36.
+        said = "p/clean.toml:18:1: BP301 error: node.axes: 3, was 4: safe axes fell from 48 to 36, "
         assert run.stdout.startswith(said)
         assert len(run.stdout.splitlines()) == 1
     assert busplan("check", "p/clean.toml", "--baseline", "b.json", "--update-baseline", cwd=folder).returncode == 0
@@ -474,6 +474,10 @@ def test_others_are_skipped_on_request_alone(busplan: Busplan, folder: Path) -> 
     assert run.stderr.splitlines() == [
         "p/other.toml: skipped, claims no schema_version",
         "p/clean.toml: ok",
+        (
+            "p/clean.toml: rests on an instant host, no busy retries, no isochronous traffic, PHYs of 14 ticks, "
+            "a chain of cables, no slower execution, no other traffic"
+        ),
         "checked 1 profile: 0 errors, 0 warnings; skipped 1 file without a schema_version",
     ]
     # A broken profile is one still, and what is not there is no other file.
@@ -500,7 +504,8 @@ def test_a_terminal_has_the_full_form_and_a_pipe_one_line_a_finding(
     assert max(map(len, lines)) <= 80
     assert "11 | period_us = 300" in lines
     assert "   |             ^^^ slice-overrun" in lines
-    assert "    cycle.slice_ratio = 0.69" in lines
+    # The paper's slice of 150 us lacks 57.8 and has to hold the 11.4 of the uncertainty, too: 219.2 of 300.
+    assert "    cycle.slice_ratio = 0.74" in lines
     assert "\x1b[" in shown
     # A file is read by a program.
     busplan("check", "p/fails.toml", "-o", "out.txt", cwd=folder)

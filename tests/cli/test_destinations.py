@@ -54,11 +54,9 @@ INTO_A_PROFILE = {
     "--output new.toml  ": ("manual", "profile", "-o", "new.toml"),
     "--baseline new.toml": ("check", "x.csv", "--baseline", "new.toml", "--update-baseline"),
 }
-AS_CSV = ("--format", "csv")
 TWICE = {
-    "--output a.svg and --plot a.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "a.svg", "--plot", "a.svg"),
-    "--output new.svg and --plot lost.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "new.svg", "--plot", "lost.svg"),
-    "--output a.svg and --plot A.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "a.svg", "--plot", "A.svg"),
+    "--output new.svg and --trace lost.svg": ("circle-test", "x.csv", "-o", "new.svg", "--trace", "lost.svg"),
+    "--output a.svg and --trace A.svg": ("circle-test", "x.csv", "-o", "a.svg", "--trace", "A.svg"),
     "--output ./a.svg and --trace a.svg": ("circle-test", "x.csv", "--trace", "a.svg", "-o", "./a.svg"),
     "--output b.json and --baseline b.json": (
         "check", "x.csv", "--baseline", "b.json", "--update-baseline", "-o", "b.json",
@@ -91,9 +89,9 @@ def test_what_is_the_purpose_is_done(run: Callable[..., object], folder: Path) -
         update,
         ("plan", "p.toml", "--nodes", "3", "--apply"),
         ("plan", "p.toml", "-o", "new.toml"),
-        ("sweep", "x.csv", *VARY, "-o", "a.svg", "--format", "csv", "--plot", "b.svg"),
+        ("circle-test", "paper-4ms", "-o", "a.svg", "--trace", "b.csv"),
     ):
         assert getattr(run(*arguments, cwd=folder), "returncode", None) == 0
     after = contents(folder)
-    assert {name for name in after if before.get(name) != after[name]} >= {"b.json", "new.toml", "a.svg", "b.svg"}
+    assert {name for name in after if before.get(name) != after[name]} >= {"b.json", "new.toml", "a.svg", "b.csv"}
     assert after["x.csv"] == before["x.csv"]

@@ -16,9 +16,9 @@ def shown(on_terminal: OnTerminal, *arguments: str, cwd: Path, env: dict[str, st
     return text
 
 
-@pytest.mark.parametrize("command", ["compare", "map", "latency", "explain"])
+@pytest.mark.parametrize("command", ["compare", "map", "latency --all", "explain"])
 def test_a_high_answer_opens_in_the_pager(on_terminal: OnTerminal, tmp_path: Path, command: str) -> None:
-    lines = shown(on_terminal, command, "paper-4ms", cwd=tmp_path, env={**LOW, **PAGER}).splitlines()
+    lines = shown(on_terminal, *command.split(), "paper-4ms", cwd=tmp_path, env={**LOW, **PAGER}).splitlines()
     assert len(lines) >= 24
     assert all(line.startswith("PAGED:") for line in lines)
 

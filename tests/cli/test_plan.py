@@ -143,7 +143,7 @@ def test_no_grade_is_better_after_a_plan(
     profile.write_text(GRADED, encoding="utf-8")
     before = explain(profile)
     assert (before["cycle.period_us"], before["bus.gap_count"]) == ("assumed", "measured")
-    given = ("mine.toml", "--nodes", 9, "--set", "payload.read_bytes=16")
+    given = ("mine.toml", "--nodes", 9, "--set", "payload.read_bytes=16", "--free", "gap_count,slice_ratio,period")
     run = busplan(*given, "-o", "new.toml", "--format", "json", cwd=profile.parent)
     changes = json.loads(run.stdout)["recommended_changes"]
     assert {*changes} == {"bus.nodes", "payload.read_bytes", "bus.gap_count", "cycle.slice_ratio", "cycle.period_us"}

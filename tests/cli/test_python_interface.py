@@ -48,20 +48,19 @@ WITH_THEIR_UNIT = {
 """Parameter of an option whose value has its unit; every other one has the option's name."""
 OPTIONS_ALONE: Mapping[str | tuple[str, str], str] = {
     "set": "load_profile(profile, changes=...)",
-    **{(name, "period"): "the same" for name in ("emulate", "timeline", "map", "explore", "compare", "report")},
+    **{
+        (name, "period"): "the same"
+        for name in ("latency", "emulate", "timeline", "map", "explore", "compare", "report")
+    },
     "all": "rows and columns on a terminal",
+    "no_pager": "where a terminal shows it",
     "format": "save(path) goes by the ending",
     "output": "save(path)",
     ("import", "force"): "replaces an old file",
     ("plan", "force"): "replaces an old file",
-    "plot": "save(path)",
-    "figure": "which figure --plot draws",
     "trace": "trace_csv(), and arrays by runs[0].trace()",
     "every": "of --trace",
     "apply": "the answer's changes, into the profile's file",
-    "columns": "of the table on a terminal: the answer has all",
-    "sort": "of the table on a terminal",
-    "top": "of the table on a terminal",
     "jobs": "processes: an executor",
     "cluster": "an executor",
     "fail_on": "exit code",

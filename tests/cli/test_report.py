@@ -1,6 +1,7 @@
 """`busplan report`: every figure is the JSON's, files, refusals, several profiles, hostile paths."""
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterator
 from decimal import Decimal
@@ -114,7 +115,9 @@ def require_rounding(shown: Shown, value: Any) -> None:
     else:
         factor = {"um": Decimal(1000), "%": Decimal(100), "ms": Decimal("0.001")}.get(shown.unit, Decimal(1))
         exact, text = Decimal(value) * factor, Decimal(shown.text)
-        assert abs(text - exact) <= Decimal((0, (5,), int(text.as_tuple().exponent) - 1)) * Decimal("1.000001"), shown
+        half = Decimal((0, (5,), int(text.as_tuple().exponent) - 1)) * Decimal("1.000001")
+        # Of a figure beyond 2^53, the float nearest to it.
+        assert abs(text - exact) <= max(half, Decimal(math.ulp(float(exact)))), shown
 
 
 def reported(run: Run, shell: Run, *arguments: str, cwd: Path) -> Page:

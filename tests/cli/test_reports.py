@@ -108,7 +108,7 @@ def test_a_payload_over_the_speeds_limit_is_warned_of_and_computed(run: Run) -> 
 def test_a_report_exits_0_whatever_its_verdict_is(
     run: Run, arguments: tuple[str, ...], exceeded: str, limited_by: str
 ) -> None:
-    one = document(run, "capacity", *arguments)["results"][0]
+    one = document(run, "capacity", *arguments, "--timing-model", "paper")["results"][0]
     assert set(one["exceeded"]) == set(exceeded.split())
     assert one["fits"] is (not exceeded)
     assert one["limited_by"] == limited_by
@@ -155,7 +155,7 @@ def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     answer |= {line[2:17].strip(): line[18:] for line in details}
     assert answer["used"].startswith("270 us of the 2000 that the bus may use, 13 %")
     assert answer["free"] == "1730 us, +/- 6"
-    assert answer["room for"] == "11 more nodes"
+    assert answer["room for"] == "11 more nodes: 13 nodes, 52 axes in all"
     assert answer["rests on"].startswith("an instant host, no busy retries")
     # These lines are the answer in the document, too.
     assert answer == {one["label"]: one["text"] for one in verdicts(run, "paper-4ms")[0]["lines"]}
@@ -242,7 +242,7 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
         (("plan", "paper-4ms", "--nodes", "two"), "invalid value for '--nodes': must be a valid integer"),
         (
             ("capacity", "paper-4ms", "--timing-model", "neither"),
-            "timing_model 'neither': expected 'paper' or 'standard'",
+            "timing_model 'neither': expected 'standard' or 'paper', or a list of them, each once",
         ),
         (
             ("latency", "paper-4ms", "--format", "xml"),

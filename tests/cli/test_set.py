@@ -177,10 +177,10 @@ def test_apply_of_a_plan_writes_the_changes_with_the_recommendation(run: Run, fo
 
 
 def test_a_new_profile_has_the_changes_and_a_plan_keeps_them(run: Run, folder: Path) -> None:
-    asked = ("--set", "cycle={period_us=300, slice_ratio=0.5}", "--set", "node.axes=2", "--axes", "6")
+    asked = ("--set", "cycle={period_us=150, slice_ratio=0.5}", "--set", "node.axes=2", "--axes", "6")
     done = run("plan", "mine.toml", "-o", "-", *asked, cwd=folder)
-    assert "With --set cycle={period_us=300, slice_ratio=0.5} and --set node.axes=2." in done.stderr
-    assert "3 nodes (6 axes) at 300 us" in done.stderr
+    assert "With --set cycle={period_us=150, slice_ratio=0.5} and --set node.axes=2." in done.stderr
+    assert "3 nodes (6 axes) at 150 us" in done.stderr
     # Neither the period nor the slice ratio may change, and nothing else helps.
     assert (done.returncode, done.stdout) == (1, "")
     asked = ("--set", "cycle={period_us=900, slice_ratio=0.5}", *asked[2:])
@@ -250,6 +250,6 @@ def test_a_picture_says_the_changes(run: Run, folder: Path) -> None:
     picture = run("timeline", "mine.toml", "--set", "bus.speed=S200", "--format", "svg", cwd=folder).stdout
     assert "With --set bus.speed" in picture
     run("circle-test", "mine.toml", "--set", "bus.speed=S200", "-o", "c.svg", cwd=folder)
-    run("sweep", "mine.toml", "--vary", "bus.nodes=1:3", "--set", "bus.speed=S200", "--plot", "s.svg", cwd=folder)
-    for name, said in (("c.svg", "--set bus.speed=S200"), ("s.svg", "mine, --set bus.speed=S200")):
+    run("map", "mine.toml", "--x", "bus.nodes=1:3", "--set", "bus.speed=S200", "-o", "s.svg", cwd=folder)
+    for name, said in (("c.svg", "--set bus.speed=S200"), ("s.svg", "With --set bus.speed=S200.")):
         assert said in (folder / name).read_text(encoding="utf-8")

@@ -123,7 +123,7 @@ def test_a_sweep_that_is_ended_leaves_what_was_there(
     running: Start, folder: Path, name: str, code: int, whole_group: bool
 ) -> None:
     (folder / "c.csv").write_text("old", encoding="utf-8")
-    with running(*SWEEP, "-o", "c.csv", "--plot", "c.svg") as process:
+    with running(*SWEEP, "-o", "c.csv") as process:
         assert until(lambda: len(workers_of(process.pid)) == 2)
         started = workers_of(process.pid)
         (os.killpg if whole_group else os.kill)(process.pid, getattr(signal, name))

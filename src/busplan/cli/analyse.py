@@ -101,7 +101,7 @@ def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges)
     return tuple(Command(f"busplan {command}") for command in commands)
 
 
-@takes_changes()
+@takes_changes(period=True)
 def latency_command(
     profile: ProfileArgument,
     payload: str | None = None,

@@ -13,6 +13,7 @@ from busplan.buses import kind_named, kind_names
 from busplan.errors import BusplanError
 from busplan.sections.base import Section, value_at
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
+from busplan.sourced import Sourced
 
 _Arrays: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
 """Tables of arrays by name, and their names, by the identity of the array: there may be thousands to look up in."""
@@ -345,6 +346,8 @@ def profile_schema() -> dict[str, Any]:
             """The default of a key, also where it is a constant."""
             has_one = "default_factory" in schema and not schema.get("default_factory_takes_data")
             made = schema["default_factory"]() if has_one else None
+            if isinstance(made, Sourced):
+                return float(made)
             return made if isinstance(made, int | float) else super().get_default_value(schema)
 
     kinds = {kind: profile_model(kind) for kind in kind_names()}

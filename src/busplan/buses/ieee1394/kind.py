@@ -141,7 +141,7 @@ cycle_master = true        # assumed: an OHCI host sends cycle starts unless its
         measure="measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv{group} --apply",
         table="""\
 kind = "table"
-grade = "assumed"          # another machine's, from Table I of the paper (busplan paper): between nothing and twice it
+grade = "assumed"          # another machine's: between nothing and twice it
 payload_bytes = [0, 4, 16, 32, 64, 128, 256, 512, 1024, 2048]   # 0 and 2048 are extrapolated
 time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
 """,

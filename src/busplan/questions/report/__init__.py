@@ -275,7 +275,7 @@ def _reported(
     options = [*change_options(changes, period_us=profile.cycle.period_us)]
 
     def command(name: str, *more: str, takes_period: bool = True) -> str:
-        # Neither latency nor the list of explain takes --period.
+        # The list of explain takes no --period.
         without = KeyChanges(tuple(change for change in changes.entries if change.option != "--period"))
         words = options if takes_period else [*change_options(without, period_us=0.0)]
         return " ".join(("busplan", name, shell_word(argument), *more, *words))
@@ -289,7 +289,7 @@ def _reported(
         if profile.has_cycle:
             yield PageSection("map", "What fits, and what limits it", command("map"), map_(profile).report())
         latencies = latency(profile).report()
-        yield PageSection("latency", "How long data take", command("latency", takes_period=False), latencies)
+        yield PageSection("latency", "How long data take", command("latency"), latencies)
         if profile.has_cycle:
             try:
                 events = timeline(profile).report()
