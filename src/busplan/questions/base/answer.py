@@ -108,7 +108,7 @@ class Answer(ABC):
         if drawing is None:
             raise BusplanError(
                 "there is nothing to draw: this answer has no picture; those of timeline, map_, compare, circle_test, "
-                "sweep, and capacity with sensitivity=True have one"
+                "and capacity with sensitivity=True have one"
             )
         return drawing
 

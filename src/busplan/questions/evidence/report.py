@@ -107,7 +107,7 @@ def _summary(kind: KindEvidence) -> Table:
                 for end in ((min(shares), max(shares)) if shares else (None, None))
             )
             title = section.title if number == 0 else ""
-            rows.append(TableRow((title, method, ShownValue(len(of_method), "figures"), *ends)))
+            rows.append(TableRow((title, method, ShownValue(len(of_method), "count"), *ends)))
     columns = (
         TableColumn("published", kind="words", wraps=True),
         TableColumn("computed by", kind="words", wraps=True),
