@@ -136,7 +136,7 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
         ("ethercat-servo-8", "jitter", 10, "outside", "measured shows latest start"),
     ],
 )
-def test_what_is_said_of_a_fault_is_what_measured_says(  # noqa: PLR0913, PLR0917 - a case and a folder
+def test_what_is_said_of_a_fault_is_what_measured_says(
     name: str, fault: str, value_us: float, verdict: str, words: str, tmp_path: Path
 ) -> None:
     machine = shipped(name)
