@@ -97,7 +97,9 @@ else:
     def __getattr__(name: str) -> object:
         if name not in __all__:
             did_you_mean = import_module("busplan.english").did_you_mean
-            words = filter(None, (f"module {__name__!r} has no attribute {name!r}", did_you_mean(name, __all__)))
+            # A function for a function, a class for a class.
+            alike = [one for one in __all__ if one.islower() == name.islower()]
+            words = filter(None, (f"module {__name__!r} has no attribute {name!r}", did_you_mean(name, alike)))
             raise AttributeError("; ".join(words))
         # `circle_test` and `CircleTestAnswer` are in module `circle`, `map_` and `MapAnswer` in `map`.
         question = name.removesuffix("Answer").lower().replace("_", "").removesuffix("test")

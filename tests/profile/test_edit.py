@@ -334,7 +334,7 @@ def test_keys_of_groups_are_edited_where_they_stand() -> None:
     text = shipped("gantry-24")
     changes = {
         "group.drives.nodes": 5,
-        "group.tool.execution.base_us": 17.5,
+        "group.tool.execution.time_us": [20, 25, 30, 40, 60],
         "group.io.execution.uncertainty_us": 0.5,
         "group.tool.read_bytes": None,
     }
@@ -347,7 +347,7 @@ def test_keys_of_groups_are_edited_where_they_stand() -> None:
     profile = read(new)
     assert [(one.nodes, one.execution.uncertainty_us) for one in profile.group] == [(5, None), (1, None), (1, 0.5)]
     tool: Any = profile.group[1]
-    assert (tool.read_bytes, tool.execution.base_us) == (None, 17.5)
+    assert (tool.read_bytes, tool.execution.time_us) == (None, (20, 25, 30, 40, 60))
 
 
 def test_an_inline_group_is_left_with_its_lines() -> None:

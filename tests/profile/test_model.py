@@ -177,8 +177,8 @@ def test_defaults_are_those_of_the_reference() -> None:
     assert (loaded.cycle.slice_ratio, loaded.cycle.nonperiodic_us) == (0.5, 0.0)
     assert (loaded.cycle.sync.ping_us, loaded.cycle.sync.ping_per_node_us) == (0.3, 0.1)
     assert loaded.payload.overhead_bytes == 20
-    # What no bus of the paper has is off.
-    assert (loaded.bus.cycle_master, loaded.bus.isochronous_us, loaded.bus.phy_delay_us) == (False, 0.0, None)
+    # An OHCI host sends cycle starts; what no bus of the paper has is off.
+    assert (loaded.bus.cycle_master, loaded.bus.isochronous_us, loaded.bus.phy_delay_us) == (True, 0.0, None)
     assert (loaded.cycle.retries, loaded.limits.reserve) == (0, 0.0)
     node, execution = loaded.node, loaded.node.execution
     assert (node.read_response, node.write_response, node.response_us) == ("split", "split", 1.63)
@@ -203,10 +203,10 @@ def test_reads_and_writes_are_not_answered_alike() -> None:
 
 def test_isochronous_traffic_needs_a_cycle_master() -> None:
     message = "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true"
-    assert refused(bus__isochronous_us=20) == [message]
     assert refused(bus__isochronous_us=20, bus__cycle_master=False) == [message]
     assert profile(bus__isochronous_us=20, bus__cycle_master=True).bus.isochronous_us == 20
-    assert profile(bus__isochronous_us=0).bus.isochronous_us == 0
+    assert profile(bus__isochronous_us=20).bus.cycle_master
+    assert profile(bus__isochronous_us=0, bus__cycle_master=False).bus.isochronous_us == 0
     # It has its place within the 125 us of one cycle start.
     assert profile(bus__isochronous_us=125, bus__cycle_master=True)
     for value in (-1e-9, 125.1, math.inf, math.nan, "20", True, None):
@@ -214,13 +214,17 @@ def test_isochronous_traffic_needs_a_cycle_master() -> None:
 
 
 def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth() -> None:
-    by_grade = {"measured": 0.1 / math.sqrt(12), "derived": 1 / math.sqrt(3), "calibrated": 4, "assumed": 4, None: 4}
+    by_grade = {"measured": 0.1 / math.sqrt(12), "derived": 1 / math.sqrt(3), "calibrated": 4, None: 4}
+    # From none to twice the value, equally likely (JCGM 100, 4.3.7).
+    by_grade["assumed"] = 40 / math.sqrt(3)
     for grade, expected in by_grade.items():
         execution = profile(node__execution__grade=grade).node.execution
         assert execution.standard_uncertainty_us(40.0) == pytest.approx(expected)
         said = profile(node__execution__grade=grade, node__execution__uncertainty_us=0.25).node.execution
         assert said.standard_uncertainty_us(40.0) == 0.25
     assert profile(host__transaction_us=5).host.standard_uncertainty_us == 0.5
+    assumed = profile(host__transaction_us=5, host__grade="assumed").host
+    assert assumed.standard_uncertainty_us == pytest.approx(5 / math.sqrt(3))
     assert profile(host__transaction_us=5, host__uncertainty_us=0).host.standard_uncertainty_us == 0
 
 

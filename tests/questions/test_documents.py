@@ -81,7 +81,7 @@ OPTIONS: dict[str, Callable[[], Any]] = {
         "paper-4ms", "paper-dma", timing_model="standard"
     ),
     "explain paper-4ms required_us --period 1ms --period 500us --timing-model both": lambda: busplan.explain(
-        "paper-4ms", "required_us", period_us=[1000, 500], timing_model=["paper", "standard"]
+        "paper-4ms", "required_us", period_us=[1000, 500], timing_model=["standard", "paper"]
     ),
     "explain paper-4ms latency.latency_us --transaction read --timing-model standard": lambda: busplan.explain(
         "paper-4ms", "latency.latency_us", transaction="read", timing_model="standard"

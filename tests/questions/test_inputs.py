@@ -80,19 +80,19 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "no model": (lambda: busplan.capacity("paper-4ms", timing_model=[]), "timing_model: no values"),
     "another model as a word": (
         lambda: busplan.capacity("paper-4ms", timing_model="both"),
-        "timing_model 'both': expected 'paper' or 'standard', or a list of them, each once",
+        "timing_model 'both': expected 'standard' or 'paper', or a list of them, each once",
     ),
     "another model": (
         lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, timing_model=["both"]),
-        "timing_model ['both']: expected 'paper' or 'standard', or a list of them, each once",
+        "timing_model ['both']: expected 'standard' or 'paper', or a list of them, each once",
     ),
     "a model twice": (
         lambda: busplan.latency("paper-4ms", timing_model=["paper", "paper"]),
-        "timing_model ['paper', 'paper']: expected 'paper' or 'standard', or a list of them, each once",
+        "timing_model ['paper', 'paper']: expected 'standard' or 'paper', or a list of them, each once",
     ),
     "another model of a timeline": (
         lambda: busplan.timeline("paper-4ms", timing_model="both"),
-        "timing_model ['both']: expected 'paper' or 'standard', or a list of them, each once",
+        "timing_model ['both']: expected 'standard' or 'paper', or a list of them, each once",
     ),
     "no payload": (
         lambda: busplan.latency("paper-4ms", payload_bytes=[0]),

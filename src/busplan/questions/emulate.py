@@ -46,6 +46,8 @@ class EmulateAnswer(Answer):
         Value of each fault, by name: how often, or how late [us].
     inside
         Faults that lie inside the plan, so that `measured` finds nothing beyond it.
+    unsure
+        Faults beyond it by less than the plan is uncertain, so that `measured` does not show them.
     """
 
     profile: Profile
@@ -55,6 +57,7 @@ class EmulateAnswer(Answer):
     seed: int
     faults: Mapping[str, float]
     inside: tuple[str, ...] = ()
+    unsure: tuple[str, ...] = ()
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         recordings = dict.fromkeys(emulator_of(self.profile).endings, lambda: self.content)
@@ -69,11 +72,11 @@ class EmulateAnswer(Answer):
         for fault, value in ((fault_named(emulator, key), value) for key, value in self.faults.items()):
             often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
             is_inside = fault.name in self.inside
-            shown = (
-                f"the plan allows this, so {fault.shown_as} is within"
-                if is_inside
-                else f"measured shows {fault.shown_as}"
-            )
+            shown = f"measured shows {fault.shown_as}"
+            if is_inside:
+                shown = f"the plan allows this, so {fault.shown_as} is within"
+            elif fault.name in self.unsure:
+                shown = f"the plan is less certain than that, so {fault.shown_as} is not shown to be outside"
             lines.append(Sentence((f"{fault.name}: {fault.words}, {often}; {shown}.",)))
             records.append({"value": value, "is_inside_plan": is_inside, **fields(fault, "name", "unit", "shown_as")})
         content = document("emulate", profile=name, **fields(self, "cycles", "duration_us", "seed"), faults=records)
@@ -132,22 +135,25 @@ def emulate(
     random = Random(whole(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
     content = emulator.emulated(network, Emulation(number, random, values, origin))
-    inside = _inside(network, emulator, content, values)
-    return EmulateAnswer(network.profile, content, number, number * period_us, seed, MappingProxyType(values), inside)
+    inside, unsure = _not_found(network, emulator, content, values)
+    shown = MappingProxyType(values)
+    return EmulateAnswer(network.profile, content, number, number * period_us, seed, shown, inside, unsure)
 
 
-def _inside(network: Network, emulator: Emulator, content: bytes, faults: Mapping[str, float]) -> tuple[str, ...]:
-    """Faults whose figure of the recording is within the plan."""
+def _not_found(
+    network: Network, emulator: Emulator, content: bytes, faults: Mapping[str, float]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Faults whose figure of the recording is within the plan, and those whose figure is not shown to be outside."""
     if not faults:
-        return ()
+        return (), ()
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"recording{emulator.endings[0]}"
         path.write_bytes(content)
         recorded = network.bus.recorded(network, path, share=1.0, channel=None, progress=ignored)
-    within = {figure.quantity for figure in recorded.figures if figure.verdict == "within"}
-    beyond = {figure.quantity for figure in recorded.figures if figure.verdict not in ("within", None)}
-    shown = {name: fault_named(emulator, name).shown_as for name in faults}
-    return tuple(name for name, figure in shown.items() if figure in within - beyond)
+    verdicts = {figure.quantity: figure.verdict for figure in recorded.figures}
+    found = {name: verdicts.get(fault_named(emulator, name).shown_as) for name in faults}
+    inside, unsure = (tuple(name for name in faults if found[name] == word) for word in ("within", "not shown"))
+    return inside, unsure
 
 
 def emulator_of(profile: Profile) -> Emulator:

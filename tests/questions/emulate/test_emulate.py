@@ -126,6 +126,30 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
     assert tried >= 3
 
 
+@pytest.mark.parametrize(
+    ("name", "fault", "value_us", "verdict", "words"),
+    [
+        ("can-servo-8", "late-command", 600, "within", "the plan allows this, so last PDO after SYNC is within"),
+        ("can-servo-8", "jitter", 100, "within", "the plan allows this, so SYNC: jitter of the arrival is within"),
+        ("can-servo-8", "late-command", 1200, "not shown", "so last PDO after SYNC is not shown to be outside"),
+        ("can-servo-8", "late-command", 3000, "outside", "measured shows last PDO after SYNC"),
+        ("ethercat-servo-8", "jitter", 10, "outside", "measured shows latest start"),
+    ],
+)
+def test_what_is_said_of_a_fault_is_what_measured_says(
+    name: str, fault: str, value_us: float, verdict: str, words: str, tmp_path: Path
+) -> None:
+    machine = shipped(name)
+    emulated = busplan.emulate(machine.path, fault={fault: value_us})
+    path = tmp_path / f"recording{machine.ending}"
+    emulated.save(path)
+    (record,) = emulated.to_dict()["faults"]
+    figures = busplan.measured(machine.path, path).figures
+    assert {figure.quantity: figure.verdict for figure in figures}[record["shown_as"]] == verdict
+    assert record["is_inside_plan"] == (verdict == "within")
+    assert words in str(emulated)
+
+
 def test_several_faults_are_all_there_and_hit_cycles_of_their_own(machines: Machines, tmp_path: Path) -> None:
     for kind, faults in FAULTS.items():
         seed = next(seed for seed in SEEDS[kind] if "cycle" in machines(kind, seed).plan)

@@ -82,10 +82,30 @@ def test_messages_of_a_node_have_its_group_for_a_sender(tmp_path: Path) -> None:
     path.write_text(answer.text.replace("[bus]", '[bus]\nqueue = "fifo"'), encoding="utf-8")
     apart = tmp_path / "apart.toml"
     apart.write_text(
-        path.read_text(encoding="utf-8").replace('sender = "Servo"', 'sender = "DRV3"', 1), encoding="utf-8"
+        re.sub(r'(name = "EMCY3"\n[^[]*?sender = )"Servo"', r'\1"DRV3"', path.read_text(encoding="utf-8")),
+        encoding="utf-8",
     )
-    together_us, apart_us = (busplan.check(each).to_dict() for each in (path, apart))
-    assert together_us != apart_us
+    together_us, apart_us = (
+        max(
+            one["worst_response_us"]
+            for one in busplan.latency(each).to_dict()["transactions"]
+            if one["transaction"] == "EMCY3"
+        )
+        for each in (path, apart)
+    )
+    assert together_us > apart_us
+
+
+@pytest.mark.parametrize(("stated", "found"), [("", 4000), ("8000", 4000), ("2000", 2000)])
+def test_the_cycle_is_that_of_the_sync_in_a_log(stated: str, found: int, tmp_path: Path) -> None:
+    lines = [
+        f"({1_700_000_000 + cycle * 4e-3 + number * 3e-4:.6f}) can0 {identifier:03X}#{data}\n"
+        for cycle in range(400)
+        for number, (identifier, data) in enumerate([(0x80, ""), (0x183, "00" * 6), (0x203, "00" * 6)])
+    ]
+    files = {"3.dcf": dcf(3) + (f"[1006]\nParameterValue={stated}\n" if stated else ""), "bus.log": "".join(lines)}
+    profile: Any = imported(tmp_path, files, bit_rate_kbit_s=500).profile
+    assert profile.cycle.period_us == pytest.approx(found, rel=1e-6)
 
 
 def test_an_emergency_is_a_message_though_no_log_has_it(tmp_path: Path) -> None:

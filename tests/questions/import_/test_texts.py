@@ -343,4 +343,4 @@ def test_the_answer_has_every_form_and_can_be_pickled(tmp_path: Path) -> None:
     for ending in ("json", "csv", "md", "html", "txt"):
         answer.save(tmp_path / f"answer.{ending}")
         assert "delay_us" in (tmp_path / f"answer.{ending}").read_text(encoding="utf-8")
-    assert repr(answer) == "<ImportAnswer: machine EtherCAT, 4 nodes, 2 axes, 500 us FITS>"
+    assert repr(answer) == "<ImportAnswer: machine EtherCAT, 4 nodes, 2 axes, 500 us NOT SHOWN TO FIT>"

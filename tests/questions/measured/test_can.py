@@ -173,7 +173,10 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     shaken = arbitrated(servo_8(300, sync_jitter_us=900))
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
-    answer = of_log(candump(arbitrated(late)), tmp_path)
+    # The drives may be slower than assumed; where their time is measured, the PDO is late.
+    assert figure(of_log(candump(arbitrated(late)), tmp_path), "last PDO").verdict == "not shown"
+    plan = busplan.load_profile(PLAN, changes={"node.execution.grade": "measured"})
+    answer = of_log(candump(arbitrated(late)), tmp_path, plan=plan)
     assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC"]
 
 

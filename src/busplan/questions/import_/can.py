@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import PurePath
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.can.frames import HOST
 from busplan.english import first_of
@@ -21,7 +21,9 @@ from busplan.questions.import_.reading import (
     lines,
     usual_period,
 )
-from busplan.recordings.can_timing import EventModel, event_model
+
+if TYPE_CHECKING:
+    from busplan.recordings.can_timing import EventModel
 
 _DIRECTIONS: Final = {"feedback": "read_bytes", "command": "write_bytes"}
 _FRAME_BYTES: Final = 8
@@ -75,7 +77,7 @@ class MostLoad(NamedTuple):
     """All seconds of the log, the last one begun [1]."""
 
 
-def timing_facts(model: EventModel, period_us: float, place: str, *, is_periodic: bool) -> Iterator[tuple[str, Fact]]:
+def timing_facts(model: "EventModel", period_us: float, place: str, *, is_periodic: bool) -> Iterator[tuple[str, Fact]]:
     """Jitter and burst of a message by a log, and that it has no deadline where that is not its period."""
     burst, jitter_us = model
     if jitter_us:
@@ -172,8 +174,16 @@ def _cycle_words(machine: Reading) -> str:
 
 
 def _period(machine: Reading) -> Fact:
-    """The period of SYNC."""
-    return machine.bus.get("period_us") or usual_period("can")
+    """The period of SYNC: as a log has it where no file says it, or where it is shorter there."""
+    stated, seen = machine.bus.get("period_us"), machine.messages.get(_sync_id(machine), {}).get("period_us")
+    if stated is None:
+        return seen or usual_period("can")
+    return seen if seen and seen.value < stated.value * (1 - _CLEARLY) else stated
+
+
+def _sync_id(machine: Reading) -> int:
+    """Identifier of SYNC."""
+    return int(machine.bus["sync_identifier"].value) if "sync_identifier" in machine.bus else _SYNC_ID
 
 
 def _nodes(machine: Reading) -> Iterator[_Node]:
@@ -245,7 +255,7 @@ def _messages(
     cycle = {node.number: [pdo for pdos in node.sent.values() for pdo in pdos] for node in nodes}
     used = {pdo.identifier for pdos in cycle.values() for pdo in pdos}
     if nodes:
-        used.add(machine.bus["sync_identifier"].value if "sync_identifier" in machine.bus else _SYNC_ID)
+        used.add(_sync_id(machine))
     left_out: dict[str, list[str]] = {}
     messages = [
         _joined(facts, machine)
@@ -448,6 +458,9 @@ def _settle_message(recorded: Facts, stated: Facts, log: Reading) -> None:
         return
     # It comes as early as in the log all the same.
     times_us, error_us = recorded[SENT].value
+    # It needs numpy, and most files have no stamps.
+    from busplan.recordings.can_timing import event_model
+
     model = event_model(times_us, period.value, stamp_error_us=error_us, tolerance=0.0)
     for key in ("period_us", "jitter_us", "burst", "deadline_us"):
         recorded.pop(key, None)
