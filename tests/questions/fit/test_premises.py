@@ -82,7 +82,12 @@ def worth(profile: busplan.Profile) -> Mapping[str, float]:
         least = plain(limit.value(network)) + plain(limit.uncertainty(network))
         found[f"limit {limit.key}"] = least - plain(limit.most(network))
     for latency in cycle.latencies():
-        found |= {f"{latency.label} {key}": plain(us) for key, us in latency.phases.items()}
+        # Each part and the total. A wait for the next frame or SYNC0 takes what the parts before it leave.
+        found |= {
+            f"{latency.label} {key}": plain(us)
+            for key, us in latency.phases.items()
+            if key.endswith("_us") and not key.endswith(("_wait_us", "deadline_us"))
+        }
     return found
 
 
