@@ -63,23 +63,29 @@ def test_the_cycle_ends_before_the_next_sync(jitter_us: float, verdict: str, tmp
 def test_other_messages_meet_the_next_sync_sooner(tmp_path: Path) -> None:
     message = '[[message]]\nname = "low"\nidentifier = 0x700\npayload_bytes = 8\nperiod_us = 100000\n'
     path = tmp_path / "low.toml"
-    # Frames alone, 10 * 55 + 6 * 95 us: its busy period ends before the next SYNC of a punctual host.
     text = PLAN.replace("nodes = 4", "nodes = 3").replace("base_us = 100", "base_us = 0")
     path.write_text(text.replace("host_us = 100", "host_us = 0") + message)
-    punctual, late = (
-        dict[str, Any](
-            responses(busplan.load_profile(path, changes={"bus.sync_jitter_us": us, "cycle.period_us": 790}))
-        )
-        for us in (0, 20)
+    punctual, barely, late = (
+        responses(busplan.load_profile(path, changes={"bus.sync_jitter_us": us, "cycle.period_us": 770}))
+        for us in (0, 4, 6)
     )
-    assert late["SYNC"] == punctual["SYNC"] + 20
-    assert late["loop"] == punctual["loop"] + 20
-    assert late["low"] >= punctual["low"]
+    assert late["SYNC"] == punctual["SYNC"] + 6
+    assert late["loop"] == punctual["loop"] + 6
+    # Commands come up to 55 + 3 * 95 us behind their SYNC, and up to J more. From such late ones on, low waits for two
+    # cycles' PDOs and a SYNC, 12 * 95 + 55 = 1195 us; the third's commands may come at 2 * 770 - 340 - J.
+    assert punctual["low"] == barely["low"] == 1195 + 135
+    assert late["low"] == 1195 + 6 * 95 + 55 + 135
 
 
 def test_a_late_sync_reaches_the_circle_and_the_timeline(tmp_path: Path) -> None:
     (first, *_) = busplan.timeline(plan(tmp_path, 30)).to_dict()["events"]
     assert (first["kind"], first["duration_us"]) == ("jitter", 30)
+    punctual, late = (
+        busplan.circle_test(busplan.load_profile("can-servo-8", changes={"bus.sync_jitter_us": us})).results[0]
+        for us in (0, 40)
+    )
+    # Half of it either way.
+    assert late.jitter_us == punctual.jitter_us + 20
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,13 @@ def test_an_execution_fitted_against_the_model_holds_its_residual(make: Maker) -
 
 @pytest.mark.parametrize(
     ("grade", "uncertainty_us"),
-    [("measured", 0.1 / sqrt(12)), ("derived", 1 / sqrt(3)), ("calibrated", 4.0), ("assumed", 40 / sqrt(3)), (None, 4.0)],
+    [
+        ("measured", 0.1 / sqrt(12)),
+        ("derived", 1 / sqrt(3)),
+        ("calibrated", 4.0),
+        ("assumed", 40 / sqrt(3)),
+        (None, 4.0),
+    ],
 )
 def test_an_execution_is_as_uncertain_as_its_grade(make: Maker, grade: str | None, uncertainty_us: float) -> None:
     profile = with_fixed_execution(make(), 40.0, **({} if grade is None else {"grade": grade}))
