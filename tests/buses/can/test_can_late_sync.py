@@ -65,16 +65,20 @@ def test_other_messages_meet_the_next_sync_sooner(tmp_path: Path) -> None:
     path = tmp_path / "low.toml"
     text = PLAN.replace("nodes = 4", "nodes = 3").replace("base_us = 100", "base_us = 0")
     path.write_text(text.replace("host_us = 100", "host_us = 0") + message)
-    punctual, barely, late = (
-        responses(busplan.load_profile(path, changes={"bus.sync_jitter_us": us, "cycle.period_us": 770}))
-        for us in (0, 4, 6)
-    )
-    assert late["SYNC"] == punctual["SYNC"] + 6
-    assert late["loop"] == punctual["loop"] + 6
-    # Commands come up to 55 + 3 * 95 us behind their SYNC, and up to J more. From such late ones on, low waits for two
-    # cycles' PDOs and a SYNC, 12 * 95 + 55 = 1195 us; the third's commands may come at 2 * 770 - 340 - J.
-    assert punctual["low"] == barely["low"] == 1195 + 135
-    assert late["low"] == 1195 + 6 * 95 + 55 + 135
+
+    def found(period_us: float, jitter_us: float) -> dict[Any, float]:
+        changes = {"bus.sync_jitter_us": jitter_us, "cycle.period_us": period_us}
+        return responses(busplan.load_profile(path, changes=changes))
+
+    punctual, late = found(770, 0), found(770, 20)
+    assert late["SYNC"] == punctual["SYNC"] + 20
+    assert late["loop"] == punctual["loop"] + 20
+    # low waits for the PDOs of two cycles and a SYNC, or of three and two SYNCs.
+    two_us, three_us = (cycles * 6 * 95 + (cycles - 1) * 55 + 135 for cycles in (2, 3))
+    # The third cycle's come two periods behind the first's, which may be J late: J is worth half of it in the period.
+    for period_us, jitter_us in ((760, 0), (765, 10), (770, 20), (780, 40)):
+        assert found(period_us, jitter_us)["low"] == three_us
+        assert found(period_us + 0.5, jitter_us)["low"] == two_us
 
 
 def test_a_late_sync_reaches_the_circle_and_the_timeline(tmp_path: Path) -> None:
