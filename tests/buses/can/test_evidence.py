@@ -4,7 +4,6 @@ from collections.abc import Callable
 from subprocess import CompletedProcess
 from typing import Any
 
-
 import busplan
 
 EVIDENCE: dict[str, Any] = busplan.evidence("can").to_dict()

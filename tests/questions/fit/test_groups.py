@@ -217,7 +217,7 @@ def test_a_sweep_gives_what_each_profile_gives(profile: busplan.Profile, nodes: 
 
 
 def test_the_figures_of_the_gantry_by_hand() -> None:
-    """Execution: 4 nodes of 40 B twice, one of 36 and 32 B, one read of 8 B; a table has 45.4 us at 32, 54.7 at 64 B."""
+    """Execution: 4 nodes of 40 B twice, one of 36 and 32 B, one read of 8 B; a table has 45.4 us at 32, 54.7 at 64."""
 
     def between_us(size: int) -> float:
         return 45.4 + (54.7 - 45.4) * (size - 32) / (64 - 32)
