@@ -314,7 +314,7 @@ def test_the_gate_sends_a_window_to_the_jitter_and_not_to_the_period(run: Any, t
 def test_the_smallest_period_keeps_commands_before_sync0() -> None:
     plan = profile(bus__distributed_clocks=True, bus__master_jitter_us=200.0, bus__sync_shift=0.25)
     result = of(plan)
-    u_us = sqrt(10**2 + (3 * 0.0079) ** 2 + (60 * stdev(BYTE_COSTS_US) * sqrt(4 / 3)) ** 2 + 0.1**2 / 12)
+    u_us = sqrt(20**2 / 3 + (3 * 0.0079) ** 2 + (60 * stdev(BYTE_COSTS_US) * sqrt(4 / 3)) ** 2 + 0.1**2 / 12)
     taken_us = result.own["command_us"] + result.bias_us
     assert result.safe_min_period_us == pytest.approx((taken_us + 2 * u_us) / 0.25, rel=1e-9)
     assert result.min_period_us == pytest.approx(taken_us / 0.25, rel=1e-9)
