@@ -249,8 +249,8 @@ def test_the_masters_datagrams_leave_the_first_frame_less_room() -> None:
         (155.0, "fits", None),
         (165.0, "not shown to fit", "not_shown"),
         (215.0, "not shown to fit", "not_shown"),
-        (225.0, "not shown to fit", "not_shown"),
-        (227.0, "does not fit", "exceeded"),
+        (221.0, "not shown to fit", "not_shown"),
+        (224.0, "does not fit", "exceeded"),
     ],
 )
 def test_a_command_must_be_taken_before_sync0(jitter_us: float, verdict: str, key: str | None) -> None:
