@@ -386,7 +386,7 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
     [
         (busplan.timeline, "messages alone have no cycle, and timeline asks for one"),
         (busplan.compare, "messages alone have no cycle, and compare asks for one"),
-        (busplan.map_, "give x and y, each a key with values"),
+        (busplan.map_, "messages alone have no cycle, and a map of period and axes asks for one"),
         (lambda own: busplan.capacity(own, sensitivity=True), "messages alone have no cycle"),
         (lambda own: busplan.capacity(own, period_us=4000), "messages alone have no cycle"),
         (lambda own: busplan.plan(own, axes=4), "a plan for axes asks for one"),

@@ -63,23 +63,33 @@ def test_the_cycle_ends_before_the_next_sync(jitter_us: float, verdict: str, tmp
 def test_other_messages_meet_the_next_sync_sooner(tmp_path: Path) -> None:
     message = '[[message]]\nname = "low"\nidentifier = 0x700\npayload_bytes = 8\nperiod_us = 100000\n'
     path = tmp_path / "low.toml"
-    # Frames alone, 10 * 55 + 6 * 95 us: its busy period ends before the next SYNC of a punctual host.
     text = PLAN.replace("nodes = 4", "nodes = 3").replace("base_us = 100", "base_us = 0")
     path.write_text(text.replace("host_us = 100", "host_us = 0") + message)
-    punctual, late = (
-        dict[str, Any](
-            responses(busplan.load_profile(path, changes={"bus.sync_jitter_us": us, "cycle.period_us": 790}))
-        )
-        for us in (0, 20)
-    )
+
+    def found(period_us: float, jitter_us: float) -> dict[Any, float]:
+        changes = {"bus.sync_jitter_us": jitter_us, "cycle.period_us": period_us}
+        return responses(busplan.load_profile(path, changes=changes))
+
+    punctual, late = found(770, 0), found(770, 20)
     assert late["SYNC"] == punctual["SYNC"] + 20
     assert late["loop"] == punctual["loop"] + 20
-    assert late["low"] >= punctual["low"]
+    # low waits for the PDOs of two cycles and a SYNC, or of three and two SYNCs.
+    two_us, three_us = (cycles * 6 * 95 + (cycles - 1) * 55 + 135 for cycles in (2, 3))
+    # The third cycle's come two periods behind the first's, which may be J late: J is worth half of it in the period.
+    for period_us, jitter_us in ((760, 0), (765, 10), (770, 20), (780, 40)):
+        assert found(period_us, jitter_us)["low"] == three_us
+        assert found(period_us + 0.5, jitter_us)["low"] == two_us
 
 
 def test_a_late_sync_reaches_the_circle_and_the_timeline(tmp_path: Path) -> None:
     (first, *_) = busplan.timeline(plan(tmp_path, 30)).to_dict()["events"]
     assert (first["kind"], first["duration_us"]) == ("jitter", 30)
+    punctual, late = (
+        busplan.circle_test(busplan.load_profile("can-servo-8", changes={"bus.sync_jitter_us": us})).results[0]
+        for us in (0, 40)
+    )
+    # Half of it either way.
+    assert late.jitter_us == punctual.jitter_us + 20
 
 
 @pytest.mark.parametrize(

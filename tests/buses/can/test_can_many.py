@@ -96,8 +96,9 @@ def test_groups_have_one_set_of_columns(run: Run, tmp_path: Path) -> None:
     assert len({tuple(row) for row in rows}) == 1
 
 
-def test_a_long_list_of_inputs_stands_once() -> None:
-    text = str(busplan.explain(many(40, load=0.5), "worst_response_us"))
+def test_a_long_list_of_inputs_stands_once(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "many.toml").write_text(text_of(many(40, load=0.5)), encoding="utf-8")
+    text = run("explain", "many.toml", "worst_response_us", "--all", cwd=tmp_path).stdout
     inputs = [line for line in text.splitlines() if "message.m7.period_us" in line]
     assert text.count("m7") > 40
     assert len(inputs) < 3  # the messages', and that of the loop

@@ -114,7 +114,7 @@ def test_a_deadline_missed_by_the_bound_alone_is_not_shown(order: str) -> None:
 
 
 def test_a_cycle_too_long_by_the_queues_alone_is_not_shown() -> None:
-    own = {"cycle__period_us": 3500, "limits__max_load": 0.99}
+    own = {"cycle__period_us": 3500, "limits__max_load": 0.99, "node__execution__grade": "measured"}
     # Five frames of a drive may be before its feedback, whatever their priority.
     more = {f"message__sdo-response__{key}": value for key, value in {"burst": 5, "period_us": 4000}.items()}
     assert figures(changed(**own, **more)).verdict == "fits"
@@ -134,20 +134,30 @@ def test_without_a_sender_nothing_is_shown_where_a_queue_is_not_by_priority(orde
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({}, "priority queues: assumed"),
-        ({"bus__queue": "priority"}, "queues: priority"),
-        ({"node__queue": "fifo"}, "queues: fifo (senders host, node), others by priority: assumed"),
+        ({"bus__queue": "priority"}, "priority"),
+        ({"node__queue": "fifo"}, "fifo (senders host, node)"),
         # A sender that is misspelt stands there.
         (
             {"bus__queue": "single-buffer", "message__sdo-request__sender": "hots"},
-            "queues: single-buffer (senders hots, node)",
+            "single-buffer (senders hots, node)",
         ),
         (
             {"bus__queue": "priority", "node__queue": "single-buffer"},
-            "queues: priority and single-buffer (senders host, node)",
+            "priority and single-buffer (senders host, node)",
         ),
     ],
 )
 def test_the_card_says_what_is_known_of_queues(changes: dict[str, Any], words: str) -> None:
-    lines = busplan.capacity(changed(**changes)).to_dict()["verdicts"][0]["lines"]
-    assert {"label": "queues", "text": words} in lines
+    card = busplan.capacity(changed(**changes)).to_dict()["verdicts"][0]
+    assert [line["text"] for line in card["lines"] if line["label"] == "queues"] == [words]
+    # An order that is given for all is no premise; one of the nodes leaves that of others.
+    others = [part["words"] for part in card["rests_on"] if part["key"] == "bus.queue"]
+    assert others == ([] if "bus__queue" in changes else ["priority queues"])
+
+
+def test_queues_that_nobody_gives_are_what_the_card_rests_on() -> None:
+    card = busplan.capacity(changed()).to_dict()["verdicts"][0]
+    assert "queues" not in {line["label"] for line in card["lines"]}
+    assert {"bus.queue", "node.queue"} <= {
+        part["key"] for part in card["rests_on"] if part["words"] == "priority queues"
+    }

@@ -283,15 +283,16 @@ def test_a_command_rests_on_the_feedback_of_the_cycle_before() -> None:
 
 def test_plan_asks_for_all_at_once_where_one_by_one_is_too_slow(run: Run) -> None:
     done = run("plan", "can-motors-8", "--nodes", "16", "--period", "8ms")
-    assert 'Enough would be to free the way to ask: bus.access = "burst"' in done.stdout
+    assert done.stdout.startswith('can-motors-8 with 16 nodes (16 axes) at 8 ms: set bus.access = "burst" (if ')
     assert run("capacity", "can-motors-8", "--set", "bus.nodes=16", "--set", "bus.access=burst").returncode == 0
 
 
 def test_the_card_says_how_many_buses_carry_all_motors(run: Run) -> None:
     card = run("capacity", "can-motors-8", "--set", "bus.nodes=30").stdout
-    assert "  buses           3 such buses, of 12 nodes or fewer\n" in card
-    assert run("capacity", "can-motors-8", "--set", "bus.nodes=12").returncode == 0
-    assert "such buses" not in run("capacity", "can-motors-8").stdout
+    assert "  buses           3 as set, of 10 nodes or fewer\n" in card
+    for nodes, verdict in ((10, "fits"), (11, "not shown to fit")):
+        assert busplan.capacity(busplan.load_profile("can-motors-8", changes={"bus.nodes": nodes})).verdict == verdict
+    assert "\n  buses " not in run("capacity", "can-motors-8").stdout
 
 
 @pytest.mark.parametrize("command", [("emulate", "can-motors-8", "-o", "x.log"), ("measured", "can-motors-8", "y.log")])

@@ -567,7 +567,12 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "first", "networks"),
-    [*((kind, 0, 60) for kind in KINDS if kind not in ("errors", "queues")), ("errors", 1300, 80), ("queues", 0, 150)],
+    [
+        *((kind, 0, 60) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs")),
+        ("errors", 1300, 80),
+        ("queues", 0, 150),
+        ("late SYNCs", 0, 120),
+    ],
 )
 def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str, first: int, networks: int) -> None:
     best = attacked(first, networks, runs=150, kind=kind)

@@ -82,7 +82,12 @@ def worth(profile: busplan.Profile) -> Mapping[str, float]:
         least = plain(limit.value(network)) + plain(limit.uncertainty(network))
         found[f"limit {limit.key}"] = least - plain(limit.most(network))
     for latency in cycle.latencies():
-        found[latency.label] = max(map(plain, latency.phases.values()))
+        # Each part and the total. A wait for the next frame or SYNC0 takes what the parts before it leave.
+        found |= {
+            f"{latency.label} {key}": plain(us)
+            for key, us in latency.phases.items()
+            if key.endswith("_us") and not key.endswith(("_wait_us", "deadline_us"))
+        }
     return found
 
 
@@ -100,7 +105,7 @@ def worse(kind: str, variant: str) -> Mapping[str, tuple[object, str]]:
         for key, field in () if part is None else not_given(part, section):
             if key in chosen or key.endswith(KNOWLEDGE):
                 continue
-            default = field.default
+            default = field.get_default(call_default_factory=True)
             for value in [usual[key]] if usual.get(key) is not None else candidates(field, default):
                 try:
                     after = worth(busplan.load_profile(profile, changes={key: value}))

@@ -99,6 +99,7 @@ PREMISES: Final = (
     Premise("bus.host_us", "an instant host", 100.0, lambda cycle: cycle.waits_for_host),
     Premise("bus.sync_counter", "SYNC without counter", True, lambda cycle: cycle.traffic.has_sync),
     Premise("bus.sync_identifier", "SYNC by its usual identifier", 0x700, lambda cycle: cycle.traffic.has_sync),
+    Premise("bus.pipeline_cycles", "commands one cycle later", 2, lambda cycle: cycle.traffic.has_cycle),
     Premise("message", "no other messages"),
     Premise("message.jitter_us", "messages without jitter", 100.0),
 )
