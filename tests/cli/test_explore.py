@@ -54,7 +54,8 @@ def lines_of(period_us: float, axes: int, size: int) -> dict[str, str]:
 def test_the_card_of_a_setting_is_that_of_capacity_of_groups_words_and_searches(
     name: str, x: dict[str, list[int]], y: dict[str, list[int | str]]
 ) -> None:
-    ((key_x, values_x), (key_y, values_y)) = (*x.items(), *y.items())
+    (key_x, values_x), *_ = x.items()
+    (key_y, values_y), *_ = y.items()
     own = next(iter(busplan.load_profile(name).node_groups))
     over = {own.payload_key("write"): [own.payload.write_bytes or 4]}
     answer = busplan.explore(name, x=x, y=y, over=over)

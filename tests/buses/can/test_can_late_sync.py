@@ -66,7 +66,7 @@ def test_other_messages_meet_the_next_sync_sooner(tmp_path: Path) -> None:
     text = PLAN.replace("nodes = 4", "nodes = 3").replace("base_us = 100", "base_us = 0")
     path.write_text(text.replace("host_us = 100", "host_us = 0") + message)
 
-    def found(period_us: float, jitter_us: float) -> dict[Any, float]:
+    def found(period_us: float, jitter_us: float) -> Any:
         changes = {"bus.sync_jitter_us": jitter_us, "cycle.period_us": period_us}
         return responses(busplan.load_profile(path, changes=changes))
 

@@ -55,7 +55,7 @@ class MostNodes(NamedTuple):
         """The same at each point of arrays."""
         import numpy as np
 
-        numbers = np.broadcast_arrays(self.nodes, self.limit, np.empty(points))[:2]
+        numbers = np.broadcast_arrays(np.asarray(self.nodes), np.asarray(self.limit), np.empty(points))[:2]
         return [(int(nodes), self.limits[int(index)].key) for nodes, index in zip(*numbers, strict=True)]
 
 
@@ -153,7 +153,8 @@ def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling:
     # `low` nodes keep the limit, `high` nodes break it.
     low, high = choose(over > 0, 0, ceiling), choose(over > 0, ceiling, ceiling + 1)
     low_over: Number = -inf
-    high_over, tried = choose(over > 0, over, inf), 1
+    high_over = choose(over > 0, over, inf)
+    tried: Number = 1
     for step in count(1):
         over = limit.excess(with_nodes(tried))
         is_over = over > 0
@@ -162,7 +163,7 @@ def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling:
         if is_everywhere(high - low <= 1):
             break
         span = high_over - low_over
-        share = 0.5 if step % _HALVED_EVERY == 0 else choose(span < _HUGE, -low_over / smaller(span, _HUGE), 0.5)
+        share = 0.5 if step % _HALVED_EVERY == 0 else choose(span < _HUGE, 0.0 - low_over / smaller(span, _HUGE), 0.5)
         tried = larger(low + 1, smaller(high - 1, rounded_down(low + (high - low) * share)))
     return smaller(low, ceiling)
 
