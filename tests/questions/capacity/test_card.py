@@ -49,26 +49,28 @@ def test_used_and_free_are_the_figures_of_the_verdict() -> None:
     answer = busplan.capacity("ethercat-servo-8")
     figures = answer.verdicts[0].deciding
     assert (figures.margin_corrected_us, figures.uncertainty_us, figures.safe_nodes) == pytest.approx(
-        (895.144, 40.195, 106), abs=1e-3
+        (895.144, 46.357, 75), abs=1e-3
     )
     _, lines = card_of(answer)
     assert lines["used"] == "105 us of 1000, 10 %"
-    assert lines["free"] == "895 us, +/- 40; 100 must stay free"
-    # 209.79 us + 44.76 us before SYNC0 at half of the period: 509.1 us, and up.
+    assert lines["free"] == "895 us, +/- 46; 100 must stay free"
+    # 209.79 us + 124.43 us before SYNC0 at half of the period: 668.4 us, and up.
     assert lines["fastest period"] == (
-        "510 us, limited by SYNC0, before which commands must arrive; 290 us with bus.sync_shift = 0.9"
+        "669 us, limited by SYNC0, before which commands must arrive; 481 us with bus.sync_shift = 0.7"
     )
-    assert lines["room for"].startswith("98 more nodes: ")
+    assert lines["room for"] == "67 more nodes: 75 nodes, 75 axes in all"
     assert lines["assumed"] == "bus.master_us: measure it first"
 
 
 def test_a_period_mends_no_limit_that_it_plays_no_part_in() -> None:
     _, lines = card_of(busplan.capacity(busplan.load_profile("dvrk", changes={"group.full.nodes": 12})))
     assert lines["limit"].startswith("the hub's block of 2116 bytes")
-    assert lines["fastest period"].startswith(f"none: {lines['limit']} (less read from each node, or cycle.schedule")
+    assert lines["fastest period"] == "none, for no period mends the limit"
     _, lines = card_of(busplan.capacity("can-servo-8", period_us=1000))
-    assert lines["fastest period"] == "3.345 ms"
-    _, lines = card_of(busplan.capacity("sercos3-servo-8", period_us=300))
+    # 2950 us + 350 us, of which a tenth more stays free: 3667 us, and up.
+    assert lines["fastest period"] == "3.67 ms"
+    measured = {"cycle.period_us": 300, "node.execution.grade": "measured"}
+    _, lines = card_of(busplan.capacity(busplan.load_profile("sercos3-servo-8", changes=measured)))
     assert (lines["limit"], lines["fastest period"]) == (
         "the bus allows no period of 300 us; the next are 250 and 500 us",
         "250 us",
@@ -91,9 +93,9 @@ def fastest(answer: busplan.CapacityAnswer) -> tuple[float, float] | None:
     known = [one for one in kind_named(answer.profile.bus.kind).periods.us if one < us]
     if kind_named(answer.profile.bus.kind).periods.us:
         return us, max(known, default=0.0)
-    # The digits that its doubt allows; three without one.
+    # The digits that its doubt allows, two of a doubt from 100 us; three without one.
     decimals = -floor(log10(doubt_us)) if doubt_us else 2 - floor(log10(us))
-    return us, us - 10.0 ** -min(max(0, decimals), 6)
+    return us, us - (10.0 ** (floor(log10(doubt_us)) - 1) if doubt_us >= 100 else 10.0 ** -min(max(0, decimals), 6))
 
 
 def verdict(profile: busplan.Profile, **changes: float) -> str | None:
@@ -142,9 +144,10 @@ def test_the_period_and_the_nodes_that_it_names_fit_and_the_next_do_not(
 
 def test_a_deadline_asks_for_a_slower_cycle_than_time_does() -> None:
     # 1.115 ms have room for the cycle; m2 has to be there within 1000 us, which PDOs every 1.386 ms leave it.
-    answer = busplan.capacity(Path(__file__).with_name("fastest-period.toml"))
+    measured = {"node.execution.grade": "measured"}
+    profile = busplan.load_profile(Path(__file__).with_name("fastest-period.toml"), changes=measured)
+    answer = busplan.capacity(profile)
     assert card_of(answer)[1]["fastest period"] == "1.386 ms, limited by deadline"
-    profile = answer.profile
     # The next one of three digits.
     short = changed(profile, {"cycle.period_us": 1000})
     assert busplan.plan(short, free=["period"]).recommended_changes == {"cycle.period_us": 1390}
@@ -155,15 +158,19 @@ def test_a_deadline_asks_for_a_slower_cycle_than_time_does() -> None:
 def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     verdict, lines = card_of(busplan.capacity("ethercat-servo-8", period_us=500))
     assert verdict == "NOT SHOWN TO FIT"
-    assert lines["limit"] == "the last command comes at 209.8 +/- 44.8 us, SYNC0 at 250.0 us"
-    assert lines["cure"].startswith("bus.sync_shift = 0.6 (drives act, and sample, later), which leaves 395 us")
+    assert lines["limit"] == "the last command comes at 209.8 +/- 124.4 us, SYNC0 at 250.0 us"
+    assert lines["cure"].startswith("bus.sync_shift = 0.7 (drives act, and sample, later), which leaves 395 us")
+    assert lines["buses"] == (
+        "no number: a single node is not shown to fit, limited by SYNC0, before which commands must arrive"
+    )
     verdict, lines = card_of(busplan.capacity("paper-4ms", period_us=500))
     assert verdict == "DOES NOT FIT"
     assert lines["short by"] == "20 us, +/- 6"
+    assert lines["buses"] == "2, of 1 node or fewer each"
     assert lines["paper model"] == "says otherwise, 207 us needed of 250, but does not decide"
     assert "room for" not in lines
     # Where nodes differ, nobody said which of them are to be more: no change is looked for, and none is spoken of.
-    verdict, lines = card_of(busplan.capacity("gantry-24", period_us=800))
+    verdict, lines = card_of(busplan.capacity("gantry-24", period_us=1900))
     assert (verdict, lines["room for"]) == ("FITS", "no more nodes")
     assert "one more" not in lines
     verdict, lines = card_of(busplan.capacity(busplan.load_profile("paper-1ms", changes={"bus.gap_count": 3})))

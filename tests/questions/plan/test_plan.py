@@ -127,12 +127,12 @@ def test_the_least_change_that_is_enough_is_taken(name: str, data: st.DataObject
 
 
 def test_two_things_are_changed_where_no_single_one_is_enough(make: Make) -> None:
-    # The slice must give 287.5 us at gap count 63 and 223.4 us at 7; of 300 us, 0.9 is 270 us.
+    # The slice must give 370.1 us at gap count 63 and 237.4 us at 7; of 300 us, 0.9 is 270 us.
     profile = make(cycle__period_us=300.0)
     for name in ("gap_count", "slice_ratio"):
         assert changes_of(profile, [name]) is None
     found = changes_of(profile, ["gap_count", "slice_ratio"])
-    assert found == {"cycle.slice_ratio": 0.75, "bus.gap_count": 7}
+    assert found == {"cycle.slice_ratio": 0.8, "bus.gap_count": 7}
     assert errors_of(changed(profile, found)) == []
 
 
@@ -153,29 +153,34 @@ def test_every_step_changes_one_thing_more_until_one_is_enough() -> None:
         ("as it is", False, "time"),
         ("gap count", False, "time"),
         ("+ slice ratio", False, "time"),
-        ("+ period", True, None),
+        ("+ responses", True, None),
     ]
     # A step that is not enough goes as far as it can.
     assert answer.options[2].changes == {"cycle.slice_ratio": 0.9, "bus.gap_count": 21}
-    assert answer.period_is_kept is False
+    assert answer.period_is_kept is True
+    slower = busplan.plan("paper-1ms", nodes=8, free=["gap_count", "slice_ratio", "period"])
+    assert [one.title for one in slower.options] == ["as it is", "gap count", "+ slice ratio", "+ period"]
+    assert slower.options[2].changes == answer.options[2].changes
+    assert slower.period_is_kept is False
 
 
 def test_nothing_to_change(make: Make) -> None:
     answer = busplan.plan(make())
     assert [(one.title, one.changes, one.recommended) for one in answer.options] == [("as it is", {}, True)]
     assert (answer.wanted, answer.binding, answer.relaxations) == ({}, None, ())
-    assert [freedom.name for freedom in answer.free] == ["gap_count", "slice_ratio", "period"]
+    assert [freedom.name for freedom in answer.free] == ["gap_count", "slice_ratio", "responses", "schedule", "period"]
 
 
 def test_what_was_asked_for_is_kept_and_part_of_the_changes(make: Make) -> None:
     wanted = {"bus.nodes": 5, "bus.gap_count": 63, "cycle.period_us": 1000.0}
     answer = busplan.plan(make(), changes=wanted)
     assert answer.wanted == {"bus.nodes": 5, "cycle.period_us": 1000.0}
-    assert [freedom.name for freedom in answer.free] == ["slice_ratio"]
+    assert [freedom.name for freedom in answer.free] == ["slice_ratio", "responses", "schedule"]
     assert answer.recommended is not None
     assert answer.recommended_changes == {
         "bus.nodes": 5,
         "cycle.period_us": 1000.0,
+        "node.read_response": "concatenated",
         "cycle.slice_ratio": answer.recommended.changes["cycle.slice_ratio"],
     }
     with pytest.raises(busplan.BusplanError, match=r"free period: cycle\.period_us was given a value"):
@@ -191,7 +196,7 @@ def test_an_unsafe_gap_count_is_never_recommended(make: Make) -> None:
 
 def test_a_bus_with_some_periods_takes_the_nearest_that_holds() -> None:
     assert changes_of(busplan.load_profile("sercos3-servo-8"), period_us=None) == {}
-    odd = busplan.load_profile("sercos3-servo-8", changes={"cycle.period_us": 300})
+    odd = busplan.load_profile("sercos3-servo-8", changes={"cycle.period_us": 300, "node.execution.grade": "measured"})
     assert changes_of(odd) == {"cycle.period_us": 250.0}
     full = busplan.load_profile("sercos3-servo-8", changes={"bus.nodes": 100})
     assert changes_of(full) == {"cycle.period_us": 750.0}
@@ -200,9 +205,9 @@ def test_a_bus_with_some_periods_takes_the_nearest_that_holds() -> None:
 def test_what_stands_in_the_way_is_said_with_what_would_be_enough() -> None:
     answer = busplan.plan("ethercat-servo-8", period_us=125)
     assert answer.binding is not None
-    assert answer.binding.why == "node needs a period of 290.000 us, and 125.000 us is the longest"
+    assert answer.binding.why == "node needs a period of 480.940 us, and 125.000 us is the longest"
     assert [(one.relaxed, one.changes) for one in answer.relaxations] == [
-        ("period", {"cycle.period_us": 290.0, "bus.sync_shift": 0.9})
+        ("period", {"cycle.period_us": 481.0, "bus.sync_shift": 0.7})
     ]
 
 

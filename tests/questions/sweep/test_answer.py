@@ -63,8 +63,8 @@ def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
     for name in ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_nodes", "safe_axes"):
         assert np.isnan(answer[name][paper]).all()
         assert not np.isnan(answer[name][standard]).any()
-    assert answer["verdict"].tolist() == ["", "fits", "", "does not fit"]
-    assert answer["safe_limited_by"].tolist() == ["", "time", "", "time"]
+    assert answer["verdict"].tolist() == ["fits", "", "does not fit", ""]
+    assert answer["safe_limited_by"].tolist() == ["time", "", "time", ""]
     alone = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]}, timing_model=["standard"])
     assert alone["safe_nodes"].dtype.kind == "i"  # where none is missing, counts are whole
 

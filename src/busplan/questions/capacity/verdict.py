@@ -200,7 +200,7 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
         *(_times(verdict) if network.groups else ()),
         *((label, Sentence((words,))) for label, words in verdict.bus_lines),
         *_room(verdict),
-        *_buses(verdict.deciding),
+        *_buses(verdict),
     ]
     if not is_brief:
         lines += _basis(verdict)
@@ -263,9 +263,15 @@ def _fastest(verdict: Verdict) -> Sentence:
         why = fastest.need.why if fastest else ""
         none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
         return Sentence((f"none{with_best}" if best else none,), "fails")
-    limit = verdict.network.bus.limit(fastest.need.key)
-    limited = "" if fastest.need.key == TIME else f", limited by {(limit and limit.label) or fastest.need.key}"
+    key = fastest.need.key
+    limited = "" if key == TIME else f", limited by {_limit_label(verdict, key)}"
     return Sentence((f"{_rounded_up(verdict, fastest.us)}{limited}{with_best}",))
+
+
+def _limit_label(verdict: Verdict, key: str | None) -> str:
+    """A limit in words: its label, or its key."""
+    limit = verdict.network.bus.limit(key) if key else None
+    return (limit and limit.label) or str(key)
 
 
 def _rounded_up(verdict: Verdict, us: float) -> str:
@@ -331,16 +337,15 @@ def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
     return text
 
 
-def _buses(figures: CapacityFigures) -> Iterator[_Line]:
+def _buses(verdict: Verdict) -> Iterator[_Line]:
     """How many such buses would carry all nodes, where one is not shown to."""
+    figures = verdict.deciding
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
-        yield "buses", Sentence((f"{ceil(figures.nodes / most)} as set, of {plural(most, 'node')} or fewer",))
+        yield "buses", Sentence((f"{ceil(figures.nodes / most)}, of {plural(most, 'node')} or fewer each",))
     elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
-        yield (
-            "buses",
-            Sentence((f"no number: a single node is not shown to fit, limited by {figures.safe_limited_by}",)),
-        )
+        limit = _limit_label(verdict, figures.safe_limited_by)
+        yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
 
 
 def _basis(verdict: Verdict) -> Iterator[_Line]:
