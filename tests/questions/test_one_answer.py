@@ -6,7 +6,7 @@ More profiles: pytest --hypothesis-profile=thorough tests/questions/test_one_ans
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext, suppress
-from math import ceil, isclose
+from math import ceil, floor, isclose, log10
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -115,15 +115,20 @@ def numbers(words: str) -> list[str]:
     return re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.]*\w)", words)
 
 
-def is_shown(text: str, known: list[float]) -> bool:
-    """Whether a number of a sentence is one of some values, rounded, rounded up, or in another unit."""
+def is_shown(text: str, known: list[float], uncertainty_us: float) -> bool:
+    """Whether a number of a sentence is one of some values, rounded, rounded up, or in another unit.
+
+    Of an uncertainty from 100 us on two digits are known, and as few tens of a time.
+    """
     decimals = len(text.partition(".")[2])
+    tens = 10 ** (floor(log10(uncertainty_us)) - 1) if uncertainty_us >= 100 else 1
     for value in known:
         for factor in (1, 100, 1e-3, 1e-6):
             scaled = abs(value) * factor
-            up = ceil(scaled * 10**decimals * (1 - 1e-9)) / 10**decimals
-            if text in {f"{scaled:.{decimals}f}", f"{up:.{decimals}f}"}:
-                return True
+            for step in (10**-decimals, tens):
+                up = ceil(scaled / step * (1 - 1e-9)) * step
+                if text in {f"{round(scaled / step) * step:.{decimals}f}", f"{up:.{decimals}f}"}:
+                    return True
     return False
 
 
@@ -217,7 +222,7 @@ def words_agree(answers: Mapping[str, Any], facts: Record, *, has_cycle: bool) -
         for label in ("used", "free", "short by", "room for", "fastest period"):
             words = lines.get(label, "")
             for number in [] if words.startswith("none: ") else numbers(words):
-                assert is_shown(number, known), (label, lines[label], number)
+                assert is_shown(number, known, facts["uncertainty_us"]), (label, lines[label], number)
         if "timeline" in answers:
             words = str(answers["timeline"])
             for label in {"used", "free", "short by"} & lines.keys():

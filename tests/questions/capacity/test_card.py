@@ -85,7 +85,7 @@ def fastest(answer: busplan.CapacityAnswer) -> tuple[float, float] | None:
     said = card_of(answer)[1]["fastest period"]
     matched = re.match(r"([\d.e+]+) (us|ms|s)\b", said)
     if matched is None:
-        assert said.startswith(("none: ", "none; "))
+        assert said.startswith(("none: ", "none; ", "none, "))
         longest_us = max(kind_named(answer.profile.bus.kind).periods.us, default=1e6)
         assert verdict(answer.profile, cycle__period_us=longest_us) != "fits"
         return None
@@ -95,7 +95,7 @@ def fastest(answer: busplan.CapacityAnswer) -> tuple[float, float] | None:
         return us, max(known, default=0.0)
     # The digits that its doubt allows, two of a doubt from 100 us; three without one.
     decimals = -floor(log10(doubt_us)) if doubt_us else 2 - floor(log10(us))
-    return us, us - (10.0 ** (floor(log10(doubt_us)) - 1) if doubt_us >= 100 else 10.0 ** -min(max(0, decimals), 6))
+    return us, us - (10.0 ** (floor(log10(doubt_us)) - 1) if doubt_us and doubt_us >= 100 else 10.0 ** -min(max(0, decimals), 6))
 
 
 def verdict(profile: busplan.Profile, **changes: float) -> str | None:
