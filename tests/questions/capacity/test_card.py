@@ -95,7 +95,9 @@ def fastest(answer: busplan.CapacityAnswer) -> tuple[float, float] | None:
         return us, max(known, default=0.0)
     # The digits that its doubt allows, two of a doubt from 100 us; three without one.
     decimals = -floor(log10(doubt_us)) if doubt_us else 2 - floor(log10(us))
-    return us, us - (10.0 ** (floor(log10(doubt_us)) - 1) if doubt_us and doubt_us >= 100 else 10.0 ** -min(max(0, decimals), 6))
+    return us, us - (
+        10.0 ** (floor(log10(doubt_us)) - 1) if doubt_us and doubt_us >= 100 else 10.0 ** -min(max(0, decimals), 6)
+    )
 
 
 def verdict(profile: busplan.Profile, **changes: float) -> str | None:
@@ -166,7 +168,7 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     verdict, lines = card_of(busplan.capacity("paper-4ms", period_us=500))
     assert verdict == "DOES NOT FIT"
     assert lines["short by"] == "20 us, +/- 6"
-    assert lines["buses"] == "2, of 1 node or fewer each"
+    assert lines["buses"] == "2 such buses, of 1 node or fewer"
     assert lines["paper model"] == "says otherwise, 207 us needed of 250, but does not decide"
     assert "room for" not in lines
     # Where nodes differ, nobody said which of them are to be more: no change is looked for, and none is spoken of.

@@ -328,7 +328,7 @@ def _buses(verdict: Verdict) -> Iterator[_Line]:
     figures = verdict.deciding
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
-        yield "buses", Sentence((f"{ceil(figures.nodes / most)}, of {plural(most, 'node')} or fewer each",))
+        yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
     elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
         limit = _limit_label(verdict, figures.safe_limited_by)
         yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
