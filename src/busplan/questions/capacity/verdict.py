@@ -296,11 +296,11 @@ def _more(count: GroupCapacity, number: int) -> str:
     """How many more nodes of a group, or of all, are shown to fit, and their axes."""
     if count.name:
         axes = (count.safe_axes or 0) - count.axes
-        return f"{number} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
+        return f"{number:,} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
     in_all = [
         plural(number, noun) for number, noun in ((count.safe_nodes, "node"), (count.safe_axes, "axis")) if number
     ]
-    return f"{number} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
+    return f"{number:,} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
 
 
 def _beside_limit(verdict: Verdict, why: str) -> str | None:
