@@ -112,7 +112,7 @@ def facts_of(document: Record) -> dict[str, Any]:
 
 
 def numbers(words: str) -> list[str]:
-    return re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.]*\w)", words)
+    return re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.]*\w)", re.sub(r"(?<=\d),(?=\d{3})", "", words))
 
 
 def is_shown(text: str, known: list[float], uncertainty_us: float) -> bool:

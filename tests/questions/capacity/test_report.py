@@ -40,7 +40,7 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
 
 def test_a_way_to_more_nodes_is_advised_only_where_none_is_spare() -> None:
     spare, full = lines(paper()), lines(paper(bus__nodes=3))
-    assert (spare["room for"], "one more" in spare) == ("1 more node", False)
+    assert (spare["room for"], "one more" in spare) == ("1 more node: 3 nodes, 12 axes in all", False)
     assert (full["room for"], full["one more"]) == ("no more nodes", "bus.gap_count = 10, which leaves 76 us")
 
 
@@ -51,10 +51,10 @@ def test_what_must_stay_free_is_said() -> None:
 
 def test_an_execution_that_no_answer_puts_on_the_bus_is_not_spoken_of() -> None:
     off = paper(node__read_response="concatenated", node__write_response="unified")
-    assert "slower execution" not in str(busplan.capacity(off))
+    assert "slower execution" not in render(busplan.capacity(off).report()._replace(is_whole=True), "table")
     assert "The execution time behind these figures" not in str(busplan.latency(off))
     on = busplan.load_profile(off, changes={"node.read_response": "split"})
-    assert "slower execution" in str(busplan.capacity(on))
+    assert "slower execution" in render(busplan.capacity(on).report()._replace(is_whole=True), "table")
     assert "The execution time behind these figures is derived." in str(busplan.latency(on))
 
 
@@ -87,7 +87,7 @@ def test_an_unsafe_gap_count_and_a_long_cable_are_warned_of() -> None:
     assert "beware" not in lines(paper(bus__gap_count=13))
     # No more nodes are spoken of than the gap count is safe for: 8 for three hops.
     said = lines(paper(bus__gap_count=9))
-    assert (said["room for"], "beware" in said) == ("1 more node", False)
+    assert (said["room for"], "beware" in said) == ("1 more node: 3 nodes, 12 axes in all", False)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_several_periods_share_a_table_and_what_holds_for_all_is_said_once() -> 
     text = render(report._replace(is_whole=True), "table")
     assert text.count("\navailable time") == 1
     assert re.search(r" 500 us +500 us +1 ms +1 ms +550 us +550 us\n", text)
-    assert re.search(r" paper +standard +paper +standard +paper +standard\n", text)
+    assert re.search(r" standard +paper +standard +paper +standard +paper\n", text)
     assert text.count("  rests on ") == text.count("  largest part ") == 1
     assert text.index(" 550 us ") < text.index("  rests on ")
     # What speaks against a verdict is of its period.

@@ -168,7 +168,7 @@ GANTRY = busplan.load_profile("gantry-24")
 def test_of_unlike_nodes_the_axes_are_by_the_group_that_has_the_most() -> None:
     answer = busplan.map_(GANTRY)
     assert answer.design is not None
-    assert (answer.design.x, answer.design.y, answer.design.nodes) == (24, 1000, 6)
+    assert (answer.design.x, answer.design.y, answer.design.nodes) == (24, 2000, 6)
     # Four axes of the tool beside five of each drive.
     assert answer.x.values == tuple(4 + 5 * nodes for nodes in range(1, 17))
     assert {cell.state for cell in answer.cells} == {"fits", "not shown to fit", "does not fit"}
@@ -300,11 +300,13 @@ def test_too_many_circles_are_refused_before_any_is_run() -> None:
 
 
 def test_one_key_gives_the_curve_of_the_free_time() -> None:
-    answer = busplan.map_("gantry-24", x={"cycle.period_us": [500, 1000, 2000]})
+    measured = {f"group.{group.name}.execution.grade": "measured" for group in GANTRY.group}
+    gantry = busplan.load_profile(GANTRY, changes=measured)
+    answer = busplan.map_(gantry, x={"cycle.period_us": [500, 1000, 2000]})
     assert answer.y is None
-    assert answer.design is answer.rows[0][1]
+    assert answer.design is answer.rows[0][2]
     for cell, period_us in zip(answer.cells, (500, 1000, 2000), strict=True):
-        (deciding,) = busplan.capacity("gantry-24", period_us=period_us, timing_model="standard").results
+        (deciding,) = busplan.capacity(gantry, period_us=period_us, timing_model="standard").results
         assert (cell.verdict, cell.margin_corrected_us, cell.available_us) == (
             deciding.verdict,
             deciding.margin_corrected_us,
@@ -319,7 +321,10 @@ def test_one_key_gives_the_curve_of_the_free_time() -> None:
     assert curve.points == tuple(
         zip((500.0, 1000.0, 2000.0), (cell.margin_corrected_us for cell in answer.cells), strict=True)
     )
-    assert [(shade.entry.words, shade.low, shade.high) for shade in plot.shades] == [("does not fit", 500, 750)]
+    assert [(shade.entry.words, shade.low, shade.high) for shade in plot.shades] == [
+        ("does not fit", 500, 750),
+        ("not shown to fit", 750, 1500),
+    ]
 
 
 def test_words_of_one_key_are_points_without_a_line() -> None:

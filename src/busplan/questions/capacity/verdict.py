@@ -310,11 +310,11 @@ def _more(count: GroupCapacity, number: int) -> str:
     """How many more nodes of a group, or of all, are shown to fit, and their axes."""
     if count.name:
         axes = (count.safe_axes or 0) - count.axes
-        return f"{number} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
+        return f"{number:,} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
     in_all = [
         plural(number, noun) for number, noun in ((count.safe_nodes, "node"), (count.safe_axes, "axis")) if number
     ]
-    return f"{number} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
+    return f"{number:,} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
 
 
 def _beside_limit(verdict: Verdict, why: str) -> str | None:
@@ -342,7 +342,7 @@ def _buses(verdict: Verdict) -> Iterator[_Line]:
     figures = verdict.deciding
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
-        yield "buses", Sentence((f"{ceil(figures.nodes / most)}, of {plural(most, 'node')} or fewer each",))
+        yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
     elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
         limit = _limit_label(verdict, figures.safe_limited_by)
         yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
