@@ -17,17 +17,15 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 
-def test_the_picture_of_axes_against_period_is_four_lines_and_true(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_picture_and_a_table_are_five_lines_and_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     script = blocks("python")[0]
-    assert sum(map(bool, script.splitlines())) == 4
+    assert sum(map(bool, script.splitlines())) == 5
     names: dict[str, Any] = {}
     exec(compile(script, "python.md", "exec"), names)
     found = busplan.capacity("paper-4ms", period_us=list(range(250, 4001, 250)), timing_model=["standard"]).results
     assert names["most"] == max(one.safe_axes or 0 for one in found)
-    assert (tmp_path / "axes.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "free.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_pages_and_pictures_are_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
