@@ -112,7 +112,8 @@ def facts_of(document: Record) -> dict[str, Any]:
 
 
 def numbers(words: str) -> list[str]:
-    return re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.]*\w)", re.sub(r"(?<=\d),(?=\d{3})", "", words))
+    """The numbers of a sentence, those of names left out."""
+    return re.findall(r"(?<![\w.])(?<!\w-)\d+(?:\.\d+)?(?![\w.]*\w)", re.sub(r"(?<=\d),(?=\d{3})", "", words))
 
 
 def is_shown(text: str, known: list[float], uncertainty_us: float) -> bool:
@@ -222,7 +223,7 @@ def words_agree(answers: Mapping[str, Any], facts: Record, *, has_cycle: bool) -
         for label in ("used", "free", "short by", "room for", "fastest period"):
             words = lines.get(label, "")
             for number in [] if words.startswith("none: ") else numbers(words):
-                assert is_shown(number, known, facts["uncertainty_us"]), (label, lines[label], number)
+                assert is_shown(number, known, facts["uncertainty_us"] or 0.0), (label, lines[label], number)
         if "timeline" in answers:
             words = str(answers["timeline"])
             for label in {"used", "free", "short by"} & lines.keys():
