@@ -249,8 +249,8 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
             "invalid value for '--format': 'xml' is not one of 'table', 'markdown'",
         ),
         (
-            ("latency", "paper-4ms", "--period", "4ms"),
-            "busplan latency: no such option: --period; --set cycle.period_us=... changes it for this run",
+            ("latency", "paper-4ms", "--gap-count", "7"),
+            "busplan latency: no such option: --gap-count; --set bus.gap_count=... changes it for this run",
         ),
         (
             ("capacity", "paper-4ms", "--timing", "paper"),
