@@ -289,7 +289,7 @@ def test_plan_asks_for_all_at_once_where_one_by_one_is_too_slow(run: Run) -> Non
 
 def test_the_card_says_how_many_buses_carry_all_motors(run: Run) -> None:
     card = run("capacity", "can-motors-8", "--set", "bus.nodes=30").stdout
-    assert "  buses           3 as set, of 10 nodes or fewer\n" in card
+    assert "  buses           3 such buses, of 10 nodes or fewer\n" in card
     for nodes, verdict in ((10, "fits"), (11, "not shown to fit")):
         assert busplan.capacity(busplan.load_profile("can-motors-8", changes={"bus.nodes": nodes})).verdict == verdict
     assert "\n  buses " not in run("capacity", "can-motors-8").stdout
