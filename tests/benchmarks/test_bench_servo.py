@@ -20,9 +20,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from busplan.servo.axis import simulate_axis
+from busplan.servo.axis import Engine, compiled_kernel, simulate_axis
 from busplan.servo.circle import simulate_circle
-from busplan.servo.engine import Engine, compiled_kernel
 from busplan.servo.parameters import Axis, LoopTiming
 from busplan.servo.path import circle_path
 

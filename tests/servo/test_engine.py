@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 
 from busplan import servo
 from busplan.errors import BusplanError
-from busplan.servo import engine
-from busplan.servo.axis import simulate_axis
+from busplan.servo import axis as simulation
+from busplan.servo.axis import add_backlash, compiled_kernel, simulate_axis
 from busplan.servo.delivery import arrivals
-from busplan.servo.engine import compiled_kernel
-from busplan.servo.mechanics import add_backlash
 from busplan.servo.parameters import Axis, Delivery, LoopTiming
 
 KERNEL = "busplan.servo._kernel"
@@ -72,7 +70,7 @@ def test_auto_is_compiled_where_it_can_be() -> None:
 @pytest.fixture
 def afresh(monkeypatch: pytest.MonkeyPatch) -> None:
     """Look for the compiled kernel anew, as a process that starts does."""
-    monkeypatch.setattr(engine, "_compiled", engine._compiled.__wrapped__)  # noqa: SLF001
+    monkeypatch.setattr(simulation, "_compiled", simulation._compiled.__wrapped__)  # noqa: SLF001
     monkeypatch.delitem(sys.modules, KERNEL, raising=False)
 
 
@@ -93,6 +91,6 @@ def test_without_an_extension_that_loads_plain_python_runs_and_compiled_is_refus
 
 def test_a_process_can_be_started_as_if_nothing_were_compiled(no_compiler: Mapping[str, str]) -> None:
     """What other rooms rely on when they ask for plain Python."""
-    program = "from busplan.servo.engine import compiled_kernel; print(compiled_kernel('auto'))"
+    program = "from busplan.servo.axis import compiled_kernel; print(compiled_kernel('auto'))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, env=no_compiler)
     assert done.stdout == "None\n"

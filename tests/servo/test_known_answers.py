@@ -10,9 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from busplan.servo.circle import CircleRun, simulate_circle
-from busplan.servo.measured_part import settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import Direction, circle_path
+from busplan.servo.path import Direction, circle_path, settling_time_us
 
 if TYPE_CHECKING:
     import control

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
+from busplan.servo.axis import add_backlash, move_to_table
 from busplan.servo.contour import measure_contour
-from busplan.servo.mechanics import add_backlash, move_to_table
 from busplan.servo.parameters import Mechanics
 
 RADIUS_MM = 100.0

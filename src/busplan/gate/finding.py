@@ -29,7 +29,7 @@ from busplan.questions.fit.network import PERIOD, changed, model_names, network_
 from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import Refused
+from busplan.servo.parameters import Refused
 
 
 class Finding(NamedTuple):

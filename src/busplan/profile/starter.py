@@ -10,7 +10,7 @@ from busplan.errors import BusplanError, PlacedError
 from busplan.profile.document import decode, read_bytes, validate
 from busplan.profile.edit import short_text, value_text
 from busplan.profile.sources import SHIPPED_SCHEMA, locate, shipped_names
-from busplan.servo.checks import dividing_step_us
+from busplan.servo.parameters import dividing_step_us
 
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
 _TURN: Final = 'path = "iso230-4"          # one whole turn is measured, after a lead-in; the paper has a "trapezoid"\n'

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from busplan.errors import ProblemKind
-from busplan.servo.checks import LARGEST, SHORTEST_STEP_US
+from busplan.servo.parameters import LARGEST, SHORTEST_STEP_US
 
 # Bounds that no machine comes near; they keep every product of two quantities finite.
 MAX_TIME_US: Final = LARGEST

@@ -12,7 +12,6 @@ from pydantic import AfterValidator, Field, create_model
 
 from busplan.elementwise import Number
 from busplan.sections.base import Extended, Problem, Section, TransactionKind, refused
-from busplan.servo.checks import parameters
 from busplan.servo.parameters import (
     MAX_LENGTH_MM,
     MAX_SPEED_MM_S,
@@ -22,6 +21,7 @@ from busplan.servo.parameters import (
     LoopPlace,
     LoopTiming,
     Mechanics,
+    parameters,
 )
 
 

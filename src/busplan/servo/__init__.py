@@ -4,6 +4,6 @@ Each axis is simulated at a fixed step, from the set-points of a circle to the p
 measured as ISO 230-4 measures real machines, and the stability margins of the position loops are computed. Nothing here
 opens a file, prints, or depends on profiles.
 
-Read in this order: `parameters`, `path`, `delivery`, `rows`, `kernel`, `axis`, `mechanics`, `contour`, `margins`,
-`measured_part`, `circle`. Only `parameters` and `checks` do not need numpy.
+Read in this order: `parameters`, `runnable`, `margins`, `path`, `delivery`, `rows`, `kernel`, `axis`, `contour`,
+`circle`. Only `parameters`, `runnable` and `kernel` do not need numpy.
 """

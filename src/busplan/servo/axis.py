@@ -1,16 +1,18 @@
-"""Simulate an axis, from set-points to position, with a fixed step."""
+"""Simulate an axis with a fixed step, from set-points to the position of its motor, and from there to the table."""
 
-from typing import TYPE_CHECKING, cast
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from busplan.errors import BusplanError
 from busplan.progress import Progress
-from busplan.servo.checks import refuse
 from busplan.servo.delivery import Arrivals
-from busplan.servo.engine import Engine, compiled_kernel
-from busplan.servo.kernel import ROUND, Constants, run_rows
-from busplan.servo.parameters import Axis, LoopTiming
+from busplan.servo.kernel import ROUND, Constants, drag, run_rows
+from busplan.servo.parameters import Axis, LoopTiming, Mechanics, refuse
 from busplan.servo.rows import KernelRows, kernel_rows, stored_steps, stored_targets_mm
 from busplan.servo.runnable import unfit_steps
 
@@ -19,10 +21,37 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+Engine = Literal["auto", "python", "compiled"]
 _US_PER_S = 1e6
+_PER_MILLION = 1e-6
 
 _CHUNK_STEPS = {False: 30_000, True: 250_000}
 """Steps between two progress reports: about 40 ms in plain Python, about 6 ms compiled."""
+
+
+def compiled_kernel(engine: Engine) -> ModuleType | None:
+    """Compiled form of `busplan.servo.kernel`, with the same functions for arrays; None to use that file itself.
+
+    Examples
+    --------
+    >>> compiled_kernel("python") is None
+    True
+    """
+    kernel = None if engine == "python" else _compiled()
+    if engine == "compiled" and kernel is None:
+        raise BusplanError(
+            "engine 'compiled': busplan was installed without a C compiler; install one and busplan again, "
+            "or use 'python'"
+        )
+    return kernel
+
+
+@cache
+def _compiled() -> ModuleType | None:
+    try:
+        return import_module("busplan.servo._kernel")
+    except ImportError:  # also if it was built for another Python
+        return None
 
 
 def simulate_axis(
@@ -115,19 +144,7 @@ def simulate_axis(
 def axis_targets(
     setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals | None = None, every: int = 1
 ) -> Floats:
-    """Return the targets that `simulate_axis` follows, at the end of every n-th step.
-
-    Parameters
-    ----------
-    setpoints_mm, axis, timing, arrivals
-        As for `simulate_axis`.
-    every
-        Steps between values [1].
-
-    Returns
-    -------
-    ndarray
-        Targets of ``simulate_axis(...)[every - 1 :: every]`` [mm].
+    """Targets that `simulate_axis` follows, at the end of every n-th step [mm].
 
     Examples
     --------
@@ -187,21 +204,6 @@ def _constants(axis: Axis, timing: LoopTiming) -> Constants:
 def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> int:
     """Count the steps of a move; refuse too many for memory and arithmetic.
 
-    Parameters
-    ----------
-    setpoints_mm, axis, timing
-        As for `simulate_axis`.
-
-    Returns
-    -------
-    int
-        Number of steps [1].
-
-    Raises
-    ------
-    BusplanError
-        Too many steps, or an encoder too fine for the travel.
-
     Examples
     --------
     >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
@@ -211,3 +213,52 @@ def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> in
     cycles = len(setpoints_mm) - 1
     refuse(*unfit_steps(cycles, reach_mm=float(np.abs(setpoints_mm).max()), axis=axis, timing=timing))
     return cycles * timing.steps_per_period
+
+
+def move_to_table(x_mm: Floats, *, y_mm: Floats, mechanics: Mechanics, engine: Engine = "auto") -> None:
+    """Convert positions of the motors to positions of the table, in place.
+
+    References
+    ----------
+    ISO 230-4, on what circular tests show: reversal, scale mismatch and squareness errors.
+
+    Examples
+    --------
+    >>> x, y = np.array([1000.0, 0.0]), np.array([0.0, 1000.0])
+    >>> move_to_table(x, y_mm=y, mechanics=Mechanics(scale_x_ppm=5.0, squareness_um_per_m=3.0))
+    >>> x.tolist(), y.tolist()
+    ([1000.005, 0.003], [0.0, 1000.0])
+    """
+    if mechanics.backlash_mm:
+        add_backlash(x_mm, backlash_mm=mechanics.backlash_mm, engine=engine)
+        add_backlash(y_mm, backlash_mm=mechanics.backlash_mm, engine=engine)
+    x_mm *= 1 + mechanics.scale_x_ppm * _PER_MILLION
+    y_mm *= 1 + mechanics.scale_y_ppm * _PER_MILLION
+    if mechanics.squareness_um_per_m:
+        x_mm += y_mm * (mechanics.squareness_um_per_m * _PER_MILLION)
+
+
+def add_backlash(position_mm: Floats, *, backlash_mm: float, engine: Engine = "auto") -> None:
+    """Convert positions of a motor to those of a table behind a backlash, in place.
+
+    Notes
+    -----
+    The motor starts in the middle of the gap, and the table does not move until the motor reaches one side of it. This
+    is the play operator, ``table = min(max(table, motor - b / 2), motor + b / 2)``.
+
+    References
+    ----------
+    M. A. Krasnosel'skii, A. V. Pokrovskii, Systems with Hysteresis, Springer 1989.
+
+    Examples
+    --------
+    >>> position = np.array([0.0, 3.0, 2.0, 0.0])
+    >>> add_backlash(position, backlash_mm=2.0)
+    >>> position.tolist()
+    [0.0, 2.0, 2.0, 1.0]
+    """
+    compiled = compiled_kernel(engine)
+    if compiled is not None:
+        compiled.drag(position_mm, backlash_mm / 2)
+    else:
+        drag(cast("MutableSequence[float]", position_mm.data), backlash_mm / 2)

@@ -7,17 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from busplan.progress import Progress
-from busplan.servo.axis import axis_targets, checked_steps, simulate_axis
-from busplan.servo.checks import Refused, refuse
+from busplan.servo.axis import Engine, axis_targets, checked_steps, move_to_table, simulate_axis
 from busplan.servo.contour import Contour, contour_error, covered_deg, measure_contour
-from busplan.servo.delivery import Arrivals, arrivals, check_delivery
-from busplan.servo.engine import Engine
+from busplan.servo.delivery import Arrivals, arrivals
 from busplan.servo.margins import LoopMargins, loop_margins
-from busplan.servo.measured_part import measured_part
-from busplan.servo.mechanics import move_to_table
-from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import CirclePath
-from busplan.servo.runnable import out_of_reach
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics, Refused, refuse
+from busplan.servo.path import CirclePath, measured_part
+from busplan.servo.runnable import out_of_reach, unfit_delivery
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +31,7 @@ class Trace:
     time_us: Floats
     command_x_mm: Floats
     command_y_mm: Floats
+    """Targets that the loops followed, with interpolation, delays and losses."""
     x_mm: Floats
     y_mm: Floats
     contour_error_mm: Floats
@@ -42,36 +39,26 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CircleRun:
-    """One simulated circle test.
-
-    Parameters
-    ----------
-    path, x, y, timing
-        Input of the simulation.
-    arrivals_x, arrivals_y
-        When and whether the packets arrived.
-    x_mm, y_mm
-        Position of the table at the end of every step, shape (steps,) [mm].
-    contour
-        Measures; finite even if the loop is unstable.
-    measured
-        Steps at constant speed that are measured: a whole turn, or the settled arc of a trapezoid.
-    margins_x, margins_y
-        Stability of both position loops.
-    """
+    """One simulated circle test."""
 
     path: CirclePath
     x: Axis
     y: Axis
     timing: LoopTiming
+    """Input of the simulation."""
     arrivals_x: Arrivals
     arrivals_y: Arrivals
+    """When and whether the packets arrived."""
     x_mm: Floats
     y_mm: Floats
+    """Position of the table at the end of every step, shape (steps,) [mm]."""
     contour: Contour
+    """Measures; finite even if the loop is unstable."""
     measured: slice
+    """Steps at constant speed that are measured: a whole turn, or the settled arc of a trapezoid."""
     margins_x: LoopMargins
     margins_y: LoopMargins
+    """Stability of both position loops."""
 
     @property
     def steps(self) -> int:
@@ -107,18 +94,7 @@ class CircleRun:
         return not stable or self.contour.max_contour_error_mm > self.path.radius_mm
 
     def trace(self, *, every: int = 1) -> Trace:
-        """Return time, targets, positions and contour error at every n-th step.
-
-        Parameters
-        ----------
-        every
-            Steps between entries; the first entry is at the end of step number `every` [1].
-
-        Returns
-        -------
-        Trace
-            Its targets are those that the loops followed, with interpolation, delays and losses.
-        """
+        """Time, targets, positions and contour error at every n-th step, the first at the end of step n."""
         if every < 1:
             refuse(Refused("every", every, "must be 1 or more"))
         seen = slice(every - 1, None, every)
@@ -190,8 +166,7 @@ def simulate_circle(
     --------
     Two P loops lag behind and cut the circle by r (1 / sqrt(1 + (w / kp)^2) - 1), w = feed / r:
 
-    >>> from busplan.servo.measured_part import settling_time_us
-    >>> from busplan.servo.path import circle_path
+    >>> from busplan.servo.path import circle_path, settling_time_us
     >>> axis, timing = Axis(position_gain_per_s=50.0, velocity_feedforward=0.0), LoopTiming(period_us=1000.0)
     >>> settling_us = settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0)
     >>> path = circle_path(50.0, feed_mm_per_min=6000.0, period_us=1000.0, settling_us=settling_us)
@@ -237,16 +212,6 @@ def check_circle(
 ) -> None:
     """Check the arguments of `simulate_circle` without simulating.
 
-    Parameters
-    ----------
-    path, x, y, timing, delivery
-        As for `simulate_circle`.
-
-    Raises
-    ------
-    BusplanError
-        As `simulate_circle`, except for "compiled".
-
     Examples
     --------
     >>> from busplan.servo.path import circle_path
@@ -260,7 +225,6 @@ def check_circle(
         refused.append(Refused("period_us", timing.period_us, right))
     for name, axis in (("x", x), ("y", y)):
         refused.extend(out_of_reach(axis, name=name, feed_mm_per_min=path.feed_mm_per_min))
-    refuse(*refused)
-    check_delivery(delivery, period_us=timing.period_us)
+    refuse(*refused, *unfit_delivery(delivery, period_us=timing.period_us))
     checked_steps(path.x_mm, axis=x, timing=timing)
     checked_steps(path.y_mm, axis=y, timing=timing)

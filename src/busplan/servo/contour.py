@@ -19,46 +19,25 @@ _DEG_PER_TURN = 360.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contour:
-    """Measures of a circular test. "The part" is the stretch at constant speed: on a whole turn, that turn.
-
-    Parameters
-    ----------
-    mean_contour_error_mm, max_contour_error_mm
-        Mean and maximum of the absolute contour error: of a whole turn, or of the whole move [mm].
-    radial_deviation_min_mm, radial_deviation_max_mm
-        Smallest and largest contour error, signed, over the part: F_min and F_max [mm].
-    circular_deviation_mm
-        Circular deviation G: largest minus smallest distance from the least-squares centre of a whole turn [mm]. None
-        without a whole turn: the least-squares centre of an arc is not that of the circle.
-    centre_offset_mm
-        Least-squares centre of the part, x and y [mm].
-    radius_deviation_mm
-        Least-squares radius of the part minus the nominal radius [mm].
-    """
+    """Measures of a circular test. "The part" is the stretch at constant speed: on a whole turn, that turn."""
 
     mean_contour_error_mm: float
     max_contour_error_mm: float
+    """Mean and maximum of the absolute contour error: of a whole turn, or of the whole move [mm]."""
     radial_deviation_min_mm: float
     radial_deviation_max_mm: float
+    """Smallest and largest contour error, signed, over the part: F_min and F_max [mm]."""
     circular_deviation_mm: float | None
+    """Circular deviation G: largest minus smallest distance from the least-squares centre of a whole turn [mm]. None
+    without a whole turn: the least-squares centre of an arc is not that of the circle."""
     centre_offset_mm: tuple[float, float]
+    """Least-squares centre of the part, x and y [mm]."""
     radius_deviation_mm: float
+    """Least-squares radius of the part minus the nominal radius [mm]."""
 
 
 def contour_error(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> Floats:
-    """Contour error of each point.
-
-    Parameters
-    ----------
-    x_mm, y_mm
-        Positions of the table about the centre of the nominal circle, shape (n,) each [mm].
-    radius_mm
-        Nominal radius r [mm].
-
-    Returns
-    -------
-    ndarray
-        ``sqrt(x^2 + y^2) - r``, positive outside the circle, shape (n,) [mm].
+    """Contour error of points about the centre of the circle, ``sqrt(x^2 + y^2) - r``: positive outside [mm].
 
     References
     ----------
@@ -138,19 +117,7 @@ def measure_contour(
 
 
 def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> float:
-    """Angle from the first to the last point about the centre, including whole turns.
-
-    Parameters
-    ----------
-    x_mm, y_mm
-        Positions of the table about the centre of the nominal circle, in order of time, shape (n,) each [mm].
-    part
-        Points to use, a slice with start and stop; by default all.
-
-    Returns
-    -------
-    float
-        Positive anticlockwise [deg].
+    """Angle from the first to the last point about the centre, with whole turns; positive anticlockwise [deg].
 
     Notes
     -----
@@ -245,16 +212,6 @@ def _add(normal: Floats, right: Floats, directions: Sequence[Floats], error: Flo
 
 def blocks(part: slice) -> Iterator[slice]:
     """Split a part of the positions into blocks, to save memory.
-
-    Parameters
-    ----------
-    part
-        The points, a slice with start and stop.
-
-    Yields
-    ------
-    slice
-        The blocks, in order.
 
     Examples
     --------

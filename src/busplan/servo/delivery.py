@@ -3,6 +3,8 @@
 The synchronous packet (SP) is a broadcast, so its jitter is common to all axes. Each node receives its set-points in
 packets of its own, so losses are drawn for each node separately. Each random quantity has its own stream: removing the
 losses does not change the jitter.
+
+Arrays have an entry for each set-point, shape (cycles + 1,): the first and the last are the axis at rest.
 """
 
 from dataclasses import dataclass
@@ -11,11 +13,11 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.servo.checks import refuse
-from busplan.servo.parameters import Delivery, OnLoss
+from busplan.servo.parameters import Delivery, OnLoss, refuse
 from busplan.servo.runnable import unfit_delivery
 
 AxisName = Literal["x", "y"]
+"""Axis of a node; the skew is added on "y"."""
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -25,20 +27,12 @@ _LOSS_STREAM = {"x": 1, "y": 2}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arrivals:
-    """When and whether the packets of each cycle reach a node; the first and last entry are the axis at rest.
-
-    Parameters
-    ----------
-    offsets_us
-        Delay of the SP of each cycle, shape (cycles + 1,) [us].
-    lost
-        True if the packet with the set-point (for a loop on the host: the command) is lost, same shape.
-    on_loss
-        Behaviour of the node after a loss.
-    """
+    """When and whether the packets of each cycle reach a node."""
 
     offsets_us: Floats
+    """Delay of the SP of each cycle [us]."""
     lost: Flags
+    """True if the packet with the set-point (for a loop on the host: the command) is lost."""
     on_loss: OnLoss = "hold"
 
     @classmethod
@@ -54,28 +48,9 @@ class Arrivals:
 
 
 def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Arrivals:
-    """Draw the arrivals at a node for a whole move.
+    """Draw the arrivals at a node for a whole move; the same seed gives the same arrivals.
 
-    Parameters
-    ----------
-    delivery
-        Jitter, skew, losses and seed.
-    name
-        The node's axis: skew is added on "y".
-    cycles
-        Number of cycles of the move [1].
-    period_us
-        Communication period [us].
-
-    Returns
-    -------
-    Arrivals
-        The same seed gives the same arrivals.
-
-    Raises
-    ------
-    BusplanError
-        Jitter and skew together exceed half the period.
+    Jitter and skew that together exceed half the period are refused: they could change the order of the SPs.
 
     Examples
     --------
@@ -89,64 +64,13 @@ def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: floa
     )
 
 
-def check_delivery(delivery: Delivery, *, period_us: float) -> None:
-    """Refuse a delivery that would change the order of packets.
+def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:
+    """Delay of each SP at a node: uniform within plus or minus the jitter, about the skew; 0 at rest [us].
 
-    Parameters
-    ----------
-    delivery
-        Jitter and skew.
-    period_us
-        Communication period [us].
-
-    Raises
-    ------
-    BusplanError
-        Jitter and skew together exceed half the period.
-
-    Examples
-    --------
-    >>> check_delivery(Delivery(jitter_us=400.0, skew_us=100.0), period_us=1000.0)
+    Only its spread matters. A real delay is skewed, but that changes its mean, and a mean delay common to all axes does
+    not change the contour.
     """
     refuse(*unfit_delivery(delivery, period_us=period_us))
-
-
-def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:
-    """Delay of each SP at a node.
-
-    Parameters
-    ----------
-    delivery
-        Jitter, skew and seed.
-    name
-        The node's axis: skew is added on "y".
-    cycles
-        Number of cycles of the move [1].
-    period_us
-        Communication period [us].
-
-    Returns
-    -------
-    ndarray
-        Delay of SP k, shape (cycles + 1,) [us]; uniform within plus or minus the jitter, about the skew. The first and
-        the last are 0, because the axes are at rest.
-
-    Raises
-    ------
-    BusplanError
-        Jitter and skew together exceed half the period, which could change the order of the SPs.
-
-    Notes
-    -----
-    Only the spread of the delay matters. A real delay is skewed, but that changes its mean, and a mean delay common to
-    all axes does not change the contour.
-
-    Examples
-    --------
-    >>> arrival_offsets_us(Delivery(skew_us=3.0), name="y", cycles=3, period_us=1000.0).tolist()
-    [0.0, 3.0, 3.0, 0.0]
-    """
-    check_delivery(delivery, period_us=period_us)
     offsets = np.zeros(cycles + 1)
     # Without jitter nothing is drawn: numpy.random takes longer to load than all delays to compute.
     if delivery.jitter_us:
@@ -158,21 +82,7 @@ def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, perio
 
 
 def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
-    """Draw the cycles in which the packet to a node is lost.
-
-    Parameters
-    ----------
-    delivery
-        Loss probability and seed.
-    name
-        The node's axis.
-    cycles
-        Number of cycles of the move [1].
-
-    Returns
-    -------
-    ndarray
-        True if the packet of cycle k is lost, shape (cycles + 1,); never for k = 0, at rest.
+    """Draw the cycles in which the packet to a node is lost; never the first, at rest.
 
     Examples
     --------
@@ -188,21 +98,7 @@ def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
 
 
 def received_mm(setpoints_mm: Floats, *, lost: Flags, on_loss: OnLoss) -> Floats:
-    """Set-points that the node uses.
-
-    Parameters
-    ----------
-    setpoints_mm
-        Set-points as sent, shape (cycles + 1,) [mm].
-    lost
-        True if a set-point is lost, same shape.
-    on_loss
-        "hold": keep the last set-point. "extrapolate": continue the line through the last two.
-
-    Returns
-    -------
-    ndarray
-        Set-points as used, same shape [mm].
+    """Set-points that the node uses: where one is lost, the last one, or the line through the last two.
 
     Examples
     --------

@@ -138,15 +138,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
 
 
 def drag(position: MutableSequence[float], half: float) -> None:
-    """Run the play operator in place.
-
-    Parameters
-    ----------
-    position
-        Positions in order of time [mm]: of the motor before, of the table after the call.
-    half
-        Half the gap [mm].
-    """
+    """Turn positions of a motor into those of the table, in place: the play operator, with half the gap [mm]."""
     table = position[0]
     for i in range(len(position)):
         motor = position[i]

@@ -28,40 +28,21 @@ _DOUBLE_POLE_STEPS = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopMargins:
-    """Stability of a position loop.
-
-    Parameters
-    ----------
-    stable
-        Whether all poles of the closed loop lie inside the unit circle. If not, all other values are None.
-    phase_margin_deg
-        Smallest change of the loop's phase that makes it unstable [deg]; None if its gain is never 1.
-    gain_margin_db
-        Smallest change of the loop's gain, up or down, that makes it unstable [dB]; None if none does.
-    crossover_hz
-        Frequency of gain 1 at which the phase margin is measured [Hz]; None if there is none.
-    settling_us
-        Time in which the slowest part of a disturbance decays to a thousandth [us].
-    """
+    """Stability of a position loop."""
 
     stable: bool
+    """Whether all poles of the closed loop lie inside the unit circle. If not, all other values are None."""
     phase_margin_deg: float | None = None
+    """Smallest change of the loop's phase that makes it unstable [deg]; None if its gain is never 1."""
     gain_margin_db: float | None = None
+    """Smallest change of the loop's gain, up or down, that makes it unstable [dB]; None if none does."""
     crossover_hz: float | None = None
+    """Frequency of gain 1 at which the phase margin is measured [Hz]; None if there is none."""
     settling_us: float | None = None
+    """Time in which the slowest part of a disturbance decays to a thousandth [us]."""
 
     def time_to_us(self, share: float) -> float:
-        """Time after which no more than a share of a disturbance is left, also of a double pole [us].
-
-        Parameters
-        ----------
-        share
-            The share, above 0 [1].
-
-        Returns
-        -------
-        float
-            Infinite if the loop is unstable.
+        """Time until at most a share of a disturbance is left, also of a double pole; infinite if unstable [us].
 
         Notes
         -----
@@ -77,20 +58,7 @@ class LoopMargins:
 
 @lru_cache(maxsize=64)
 def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
-    """Compute the stability margins of the discrete position loop.
-
-    Parameters
-    ----------
-    axis
-        Gains, drive lag and, for a loop on the host, delay; feed-forward, resolution and friction are not part of the
-        linear loop.
-    timing
-        Timing of the loop.
-
-    Returns
-    -------
-    LoopMargins
-        Stability, phase margin, gain margin and crossover.
+    """Compute the stability margins of the discrete position loop, without feed-forward, resolution and friction.
 
     Notes
     -----

@@ -1,55 +1,246 @@
-"""Parameters of the simulation: axis, timing of the loop, delivery of set-points, mechanics.
+"""Parameters of the simulation and their ranges: axis, timing of the loop, delivery of set-points, mechanics.
 
 Zero means ideal: no lag, no offset, no play, no quantisation. Profiles take names, defaults, ranges and descriptions
 from these fields. This module does not need numpy, so that profiles can be validated without it.
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
-from busplan.servo.checks import (
-    LARGEST,
-    SHORTEST_STEP_US,
-    Refused,
-    negative,
-    no_multiple,
-    not_positive,
-    out_of_range,
-    parameter,
-    refuse,
-)
+from busplan.errors import BusplanError
 
 LoopPlace = Literal["node", "host"]
 Interpolation = Literal["linear", "hold"]
 OnLoss = Literal["hold", "extrapolate"]
 
+LARGEST = 1e9
+"""A larger gain, length or time is a typing error; products of allowed values do not overflow."""
+SHORTEST_STEP_US = 1e-3
 MAX_LENGTH_MM = 1e6
 MAX_SPEED_MM_S = 1e6
-_MIN_SPEED_MM_S = 1e-6
-_MAX_PPM = 1e5
-_ROUNDING_PERIODS = 1e-9
-"""Tolerance in periods, so that rounding does not add a period to a delay."""
 LONGEST_DELAY_PERIODS = 16
 """Most periods from a sample to its command; a loop with more needs a different controller."""
 FINEST_ENCODER_MM = 1e-9
 """A picometre: a float of 53 bits cannot count finer steps over metres of travel."""
 
+_MIN_SPEED_MM_S = 1e-6
+_MAX_PPM = 1e5
+_ROUNDING_PERIODS = 1e-9
+"""Tolerance in periods, so that rounding does not add a period to a delay."""
+_MULTIPLE_TOLERANCE = 1e-9
+"""Periods such as 1000 / 3 us are not exact floats; a relative 1e-9 is a microsecond in a quarter of an hour."""
+_ROUNDING = 1e-12
+_NANOSECONDS = 3
+"""Decimals of a time in us."""
+_MOST_STEPS_MORE = 100
+"""Further numbers of steps in a period that are tried for a round step. Chosen."""
+_KNOWN = "known"
+_Value = TypeVar("_Value")
+
+
+class Refused(NamedTuple):
+    """One value that cannot be simulated."""
+
+    name: str
+    """Name of the parameter for the user."""
+    value: object
+    """Value as the message shows it."""
+    right: str
+    """Value or range that would be right."""
+    beside: tuple[str, ...] = ()
+    """Other parameters that it is refused for, which may be the ones that a user gave."""
+
+    @property
+    def message(self) -> str:
+        """Message with name, value and what would be right."""
+        return f"{self.name} = {self.value}: {self.right}"
+
+
+class ParameterError(BusplanError):
+    """Parameters that cannot be simulated."""
+
+    def __init__(self, *refused: Refused) -> None:
+        super().__init__(*(problem.message for problem in refused))
+        self.refused = refused
+
+    def __reduce__(self) -> tuple[Callable[..., "ParameterError"], tuple[Refused, ...]]:
+        """Pickle with all arguments; by default, an exception is pickled with its message only."""
+        return ParameterError, self.refused
+
+
+def refuse(*refused: Refused) -> None:
+    """Raise a single `ParameterError` for all refused values; without any, do nothing.
+
+    Examples
+    --------
+    >>> refuse()
+    >>> refuse(Refused("radius_mm", 0, "must be above 0"))
+    Traceback (most recent call last):
+    ...
+    busplan.servo.parameters.ParameterError: radius_mm = 0: must be above 0
+    """
+    if refused:
+        raise ParameterError(*refused)
+
+
+class Known(NamedTuple):
+    """Metadata of a parameter."""
+
+    description: str
+    """Description that ends in the unit in brackets."""
+    example: object
+    least: float | None
+    """Smallest value; None for a word, whose type lists the allowed ones."""
+    most: float | None
+    never: tuple[int, str] | None
+    """A value between `least` and `most` that is not allowed, and what would be right."""
+
+
+class Parameter(NamedTuple):
+    """One parameter of a dataclass."""
+
+    name: str
+    type: object
+    default: object
+    known: Known
+
+
+def parameter(
+    default: _Value,
+    description: str,
+    *,
+    example: object,
+    least: float | None = None,
+    most: float | None = None,
+    never: tuple[int, str] | None = None,
+) -> _Value:
+    """Declare a parameter: a field of a dataclass with its default and metadata."""
+    known = Known(description, example, least, most, never)
+    return field(default=default, metadata={_KNOWN: known})
+
+
+def parameters(of: Any) -> Iterator[Parameter]:
+    """Yield every parameter of a dataclass, in the order of its fields."""
+    for key in fields(of):
+        if _KNOWN in key.metadata:
+            yield Parameter(key.name, key.type, key.default, key.metadata[_KNOWN])
+
+
+def out_of_range(values: Any) -> Iterator[Refused]:
+    """Yield every parameter of a dataclass whose value is not allowed.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Encoder:
+    ...     lines: int = parameter(1000, "Lines of the disc [1]", example=500, least=1, most=100_000)
+    >>> [problem.message for problem in out_of_range(Encoder(lines=0))]
+    ['lines = 0: must be between 1 and 100000']
+    """
+    for name, type_, _, known in parameters(values):
+        value = getattr(values, name)
+        if known.least is None or known.most is None:
+            yield from not_one_of(*get_args(type_), **{name: value})
+        elif not known.least <= value <= known.most:
+            yield Refused(name, value, f"must be between {known.least:g} and {known.most:g}")
+        elif known.never is not None and value == known.never[0]:
+            yield Refused(name, value, known.never[1])
+
+
+def not_positive(**values: float) -> Iterator[Refused]:
+    """Yield every value that is not above zero.
+
+    Examples
+    --------
+    >>> [problem.message for problem in not_positive(radius_mm=0)]
+    ['radius_mm = 0: must be above 0 and at most 1e+09']
+    """
+    for name, value in values.items():
+        if not 0 < value <= LARGEST:
+            yield Refused(name, value, f"must be above 0 and at most {LARGEST:g}")
+
+
+def negative(**values: float) -> Iterator[Refused]:
+    """Yield every value below zero; see `not_positive`.
+
+    Examples
+    --------
+    >>> [problem.message for problem in negative(drive_lag_us=-1, backlash_mm=0)]
+    ['drive_lag_us = -1: must be between 0 and 1e+09']
+    """
+    for name, value in values.items():
+        if not 0 <= value <= LARGEST:
+            yield Refused(name, value, f"must be between 0 and {LARGEST:g}")
+
+
+def not_one_of(*allowed: str, **values: str) -> Iterator[Refused]:
+    """Yield every word that is not among the allowed ones.
+
+    Examples
+    --------
+    >>> [problem.message for problem in not_one_of("ccw", "cw", direction="left")]
+    ["direction = 'left': must be one of 'ccw', 'cw'"]
+    """
+    for name, value in values.items():
+        if value not in allowed:
+            yield Refused(name, repr(value), f"must be one of {', '.join(map(repr, allowed))}")
+
+
+def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
+    """Yield the step if the period is not a multiple of it.
+
+    Examples
+    --------
+    >>> [problem.message for problem in no_multiple(period_us=1000, step_us=300)]
+    ['step_us = 300: the period of 1000 us is no multiple of it; 250 us would fit']
+    >>> [problem.message for problem in no_multiple(period_us=1000, step_us=2000)]
+    ['step_us = 2000: longer than the period of 1000 us; the period is the longest step that fits']
+    """
+    if is_multiple(period_us, step_us):
+        return
+    if step_us > period_us:
+        right = f"longer than the period of {period_us:g} us; the period is the longest step that fits"
+    else:
+        fits_us = dividing_step_us(period_us, most_us=step_us)
+        right = f"the period of {period_us:g} us is no multiple of it; {fits_us:.15g} us would fit"
+    yield Refused("step_us", step_us, right, ("period_us",))
+
+
+def is_multiple(period_us: Any, step_us: Any) -> Any:
+    """Whether a period is a whole number of steps, of one at least; of numbers or of arrays.
+
+    Examples
+    --------
+    >>> is_multiple(1000.0, 250.0), is_multiple(1000.0, 300.0), is_multiple(1000.0, 2000.0)
+    (True, False, False)
+    """
+    steps = period_us / step_us
+    nearest = (steps + 0.5) // 1
+    return (nearest > 0) & (abs(steps - nearest) <= _MULTIPLE_TOLERANCE * steps)
+
+
+def dividing_step_us(period_us: float, *, most_us: float) -> float:
+    """Longest step up to a given step that divides a period, in whole nanoseconds where such a step is near [us].
+
+    Examples
+    --------
+    >>> [dividing_step_us(period_us, most_us=100.0) for period_us in (1000.0, 250.0, 50.0, 1000 / 3)]
+    [100.0, 62.5, 50.0, 83.33333333333333]
+    """
+    fewest = math.ceil(period_us / most_us * (1 - _MULTIPLE_TOLERANCE))
+    for steps in range(fewest, min(2 * fewest, fewest + _MOST_STEPS_MORE) + 1):
+        step_us = round(period_us / steps, _NANOSECONDS)
+        if math.isclose(step_us * steps, period_us, rel_tol=_ROUNDING):
+            return step_us
+    return period_us / fewest
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
     """One axis: its position controller, its drive, its encoder.
-
-    Parameters
-    ----------
-    delay_us
-        Time Td from a sample until its command takes effect; used only by a loop on the host [us].
-
-    Raises
-    ------
-    BusplanError
-        A value is out of range.
 
     Examples
     --------
@@ -58,7 +249,7 @@ class Axis:
     >>> Axis(position_gain_per_s=float("inf"))
     Traceback (most recent call last):
     ...
-    busplan.servo.checks.ParameterError: position_gain_per_s = inf: must be between 0 and 1e+09
+    busplan.servo.parameters.ParameterError: position_gain_per_s = inf: must be between 0 and 1e+09
     """
 
     position_gain_per_s: float = parameter(100.0, "Proportional gain kp [1/s]", example=143, least=0, most=LARGEST)
@@ -118,6 +309,7 @@ class Axis:
         most=MAX_SPEED_MM_S,
     )
     delay_us: float = 0.0
+    """Time Td from a sample until its command takes effect; used only by a loop on the host [us]."""
 
     def __post_init__(self) -> None:
         """Refuse invalid values, all in a single error."""
@@ -146,16 +338,6 @@ class Axis:
 class LoopTiming:
     """Timing of the position loop.
 
-    Parameters
-    ----------
-    period_us
-        Communication period T_s, with a set-point each [us].
-
-    Raises
-    ------
-    BusplanError
-        A time is out of range, the step is longer than the period or does not divide it.
-
     Examples
     --------
     >>> LoopTiming(period_us=4000, step_us=100).steps_per_period
@@ -163,6 +345,7 @@ class LoopTiming:
     """
 
     period_us: float
+    """Communication period T_s, with a set-point each [us]."""
     loop: LoopPlace = parameter(
         "node",
         "Where the position loop is closed: on the node each step, or on the host each period",
@@ -200,11 +383,6 @@ class LoopTiming:
     def delay_parts(self, delay_us: float) -> tuple[int, float]:
         """Periods that a command waits in a loop on the host [1], and the rest of its delay, up to one period [us].
 
-        Parameters
-        ----------
-        delay_us
-            Time from a sample until its command takes effect [us].
-
         Examples
         --------
         >>> timing = LoopTiming(period_us=1000, step_us=100, loop="host")
@@ -218,11 +396,6 @@ class LoopTiming:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delivery:
     """Delivery of set-points to the nodes.
-
-    Raises
-    ------
-    BusplanError
-        A value is out of range.
 
     Examples
     --------
@@ -261,11 +434,6 @@ class Delivery:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mechanics:
     """Errors between encoders and table.
-
-    Raises
-    ------
-    BusplanError
-        A value is out of range.
 
     Examples
     --------

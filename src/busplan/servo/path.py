@@ -1,4 +1,4 @@
-"""The circle that the host interpolates: a set-point each period, with speed ramps at both ends.
+"""The circle that the host interpolates, a set-point each period with speed ramps at both ends, and its measured part.
 
 There are two paths. The paper's, `trapezoid`, is one circle with both ramps on it. `iso230-4` has a lead-in of whole
 turns until the loops have settled, then one whole turn at constant speed on which everything is measured, then the
@@ -7,55 +7,49 @@ ramp down.
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.servo.checks import negative, not_one_of, not_positive, refuse
-from busplan.servo.runnable import move_along, unfit_move
+from busplan.servo.margins import LoopMargins, loop_margins
+from busplan.servo.parameters import Axis, LoopTiming, negative, not_one_of, not_positive, refuse
+from busplan.servo.runnable import LONGEST_SETTLING_US, move_along, unfit_move
 
 Direction = Literal["ccw", "cw"]
 Floats = NDArray[np.float64]
 
 _US_PER_S = 1e6
 _S_PER_MIN = 60.0
+_SETTLING_SHARE = 0.2
+"""Largest share of a trapezoid's constant speed that the measures leave out for settling."""
+REST_MM = 1e-4
+"""Remaining lag that counts as settled, where no tolerance says how round the circle must be."""
+_ROUNDING_STEPS = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CirclePath:
-    """Set-points of a move on a circle about the origin.
-
-    Parameters
-    ----------
-    radius_mm
-        Radius [mm].
-    feed_mm_per_min
-        Speed along the path between the ramps [mm/min].
-    period_us
-        Time between set-points [us].
-    x_mm, y_mm
-        Set-points after the start at time 0, shape (setpoints + 1,) [mm].
-    constant_from_us, constant_until_us
-        Start and end of the constant speed [us].
-    turn_from_us
-        Start of the whole turn to measure, which ends with the constant speed [us]; None on a trapezoid.
-    settling_us
-        Least time at constant speed before that turn [us]; None on a trapezoid.
-    direction
-        Direction of rotation.
-    """
+    """Set-points of a move on a circle about the origin."""
 
     radius_mm: float
+    """Radius [mm]."""
     feed_mm_per_min: float
+    """Speed along the path between the ramps [mm/min]."""
     period_us: float
+    """Time between set-points [us]."""
     x_mm: Floats
     y_mm: Floats
+    """Set-points after the start at time 0, shape (setpoints + 1,) [mm]."""
     constant_from_us: float
     constant_until_us: float
+    """Start and end of the constant speed [us]."""
     turn_from_us: float | None = None
+    """Start of the whole turn to measure, which ends with the constant speed [us]; None on a trapezoid."""
     settling_us: float | None = None
+    """Least time at constant speed before that turn [us]; None on a trapezoid."""
     direction: Direction = "ccw"
+    """Direction of rotation."""
 
     @property
     def setpoints(self) -> int:
@@ -185,3 +179,74 @@ def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: fl
 def _speeding_up(time_s: Floats, *, feed_mm_s: float, ramp_s: float) -> Floats:
     ramp_mm = feed_mm_s * time_s**2 / (2 * ramp_s)
     return np.where(time_s < ramp_s, ramp_mm, feed_mm_s * (time_s - ramp_s / 2))
+
+
+def settling_time_us(
+    x: Axis, y: Axis, *, timing: LoopTiming, feed_mm_per_min: float, rest_mm: float = REST_MM
+) -> float | None:
+    """Time at constant speed until both loops settle to `rest_mm` [us]; None if unstable or over `LONGEST_SETTLING_US`.
+
+    Notes
+    -----
+    A loop that starts to move is off by its following error, at most v / kp. With the spectral radius rho of the linear
+    loop, about rho^n of it is left after n control periods; `LoopMargins.time_to_us` allows for a double pole.
+    Friction puts an axis off by at most ``reversal / kp``, which fades with its recovery: that of the start must go,
+    too.
+
+    Examples
+    --------
+    >>> axis, timing = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0), LoopTiming(period_us=1000.0)
+    >>> round(settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0) / 1e3)
+    118
+    """
+    times_us = []
+    for axis in (x, y):
+        lag_mm = feed_mm_per_min / _S_PER_MIN / axis.position_gain_per_s if axis.position_gain_per_s else math.inf
+        margins = loop_margins(axis, timing=timing)
+        times_us.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
+        if times_us[-1] < math.inf:
+            friction_mm = axis.reversal_mm_s / axis.position_gain_per_s
+            times_us.append(axis.reversal_recovery_us * math.log(max(friction_mm / rest_mm, 1.0)))
+    settling_us = max(times_us) + timing.period_us
+    return settling_us if settling_us <= LONGEST_SETTLING_US else None
+
+
+class MeasuredPart(NamedTuple):
+    """Steps that are measured; a position is that at the end of its step."""
+
+    steps: slice
+    turn_share: float | None
+    """Share of the last step that belongs to a turn; None for an arc."""
+
+
+def measured_part(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> MeasuredPart:
+    """Steps that are measured: the whole turn where the path has it, else its settled arc.
+
+    Examples
+    --------
+    >>> path = circle_path(1.0, feed_mm_per_min=600.0, period_us=1000.0, ramp_periods=0, settling_us=0.0)
+    >>> part = measured_part(path, timing=LoopTiming(period_us=1000.0), margins=())
+    >>> part.steps, round(part.turn_share, 3)
+    (slice(6290, 12574, None), 0.185)
+    """
+    if path.turn_from_us is None:
+        return _settled_arc(path, timing=timing, margins=margins)
+    return _turn(path, timing, from_us=path.turn_from_us)
+
+
+def _turn(path: CirclePath, timing: LoopTiming, *, from_us: float) -> MeasuredPart:
+    """Steps of the whole turn at constant speed."""
+    first = round(from_us / timing.step_us)
+    turn = path.turn_us / timing.step_us
+    count = max(1, math.ceil(turn - _ROUNDING_STEPS))
+    return MeasuredPart(slice(first, first + count), min(1.0, turn - (count - 1)))
+
+
+def _settled_arc(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> MeasuredPart:
+    """Steps at constant speed without settling; at least one."""
+    start, stop = path.constant_from_us + path.period_us, path.constant_until_us
+    settling = max(0.0 if margin.settling_us is None else margin.settling_us for margin in margins)
+    start += min(settling, _SETTLING_SHARE * max(stop - start, 0.0))
+    first = math.ceil(start / timing.step_us) - 1
+    last = max(math.floor(stop / timing.step_us), first + 1)
+    return MeasuredPart(slice(first, last), None)

@@ -22,66 +22,31 @@ _US_PER_S = 1e6
 
 
 class KernelRows(NamedTuple):
-    """Columns of the kernel's rows, all of the same length.
-
-    Parameters
-    ----------
-    substeps
-        Number of sub-steps in the row [1].
-    target_mm, increment_mm
-        Target at the first control of the row, and its increment at each further control [mm].
-    forward_mm_s
-        Feed-forward velocity [mm/s].
-    action
-        Sum of `CONTROL`, `SWITCH` and `STORE`, applied to each sub-step of the row.
-    length_s
-        Length of a sub-step [s]; 0 for an event without duration.
-    drive_keep, drive_shift_s
-        Decay factor of the drive's lag over a sub-step [1], and its integral [s].
-    friction_keep, friction_shift_s
-        The same for the friction disturbance [1], [s].
-    """
+    """Columns of the kernel's rows, all of the same length."""
 
     substeps: Ints
+    """Number of sub-steps in the row [1]."""
     target_mm: Floats
     increment_mm: Floats
+    """Target at the first control of the row, and its increment at each further control [mm]."""
     forward_mm_s: Floats
+    """Feed-forward velocity [mm/s]."""
     action: Ints
+    """Sum of `CONTROL`, `SWITCH` and `STORE`, applied to each sub-step of the row."""
     length_s: Floats
+    """Length of a sub-step [s]; 0 for an event without duration."""
     drive_keep: Floats
     drive_shift_s: Floats
+    """Decay factor of the drive's lag over a sub-step [1], and its integral [s]."""
     friction_keep: Floats
     friction_shift_s: Floats
+    """The same for the friction disturbance [1], [s]."""
 
 
 def kernel_rows(
     setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, chunk_steps: int
 ) -> Iterator[KernelRows]:
     """Split a move into rows, in chunks, so that memory does not grow with the move.
-
-    Parameters
-    ----------
-    setpoints_mm
-        Set-points as sent, after the start at rest, shape (cycles + 1,) [mm].
-    axis
-        The axis; feed-forward, lag, recovery and delay are used.
-    timing
-        Timing of the loop.
-    arrivals
-        When and whether the packets of each cycle arrive.
-    chunk_steps
-        Approximate number of steps in a chunk [1].
-
-    Raises
-    ------
-    ValueError
-        The set-points are not finite or fewer than two; or the arrivals have another shape, offsets at the start or the
-        end, or offsets beyond half a period.
-
-    Yields
-    ------
-    KernelRows
-        The rows in order of time.
 
     Notes
     -----
@@ -117,11 +82,6 @@ def kernel_rows(
 def stored_steps(rows: KernelRows) -> int:
     """Count the positions that the kernel stores for some rows.
 
-    Parameters
-    ----------
-    rows
-        Rows of an axis.
-
     Examples
     --------
     >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
@@ -135,16 +95,6 @@ def stored_steps(rows: KernelRows) -> int:
 
 def stored_targets_mm(rows: KernelRows) -> Floats:
     """Targets at the end of every stored sub-step.
-
-    Parameters
-    ----------
-    rows
-        Rows of an axis.
-
-    Returns
-    -------
-    ndarray
-        The targets [mm].
 
     Examples
     --------

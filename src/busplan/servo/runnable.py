@@ -7,8 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from busplan.servo.checks import Refused
-from busplan.servo.parameters import Axis, Delivery, LoopTiming
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Refused
 
 MAX_SETPOINTS = 10_000_000
 """Most set-points of a move, 2.8 h at 1 ms; more is a typing error."""
@@ -58,11 +57,6 @@ def move_along(
 ) -> Move:
     """Lay out the move of `circle_path` without its set-points.
 
-    Parameters
-    ----------
-    radius_mm, feed_mm_per_min, period_us, ramp_periods, settling_us
-        As for `busplan.servo.path.circle_path`, in range.
-
     Examples
     --------
     >>> move_along(320.0, feed_mm_per_min=2500.0, period_us=4000.0).setpoints
@@ -82,15 +76,7 @@ def move_along(
 
 
 def unfit_move(move: Move, *, radius_mm: float) -> Iterator[Refused]:
-    """Refuse a move that never reaches its feed, or that takes too many set-points.
-
-    Parameters
-    ----------
-    move
-        The move.
-    radius_mm
-        Radius of its circle [mm].
-    """
+    """Refuse a move that never reaches its feed, or that takes too many set-points."""
     feed_mm_s = move.feed_mm_per_min / _S_PER_MIN
     if move.length_mm < feed_mm_s * move.ramp_s:
         reachable = move.length_mm / move.ramp_s * _S_PER_MIN
@@ -111,17 +97,7 @@ def unfit_move(move: Move, *, radius_mm: float) -> Iterator[Refused]:
 
 
 def unfit_steps(setpoints: int, *, reach_mm: float, axis: Axis, timing: LoopTiming) -> Iterator[Refused]:
-    """Refuse a move with too many steps for memory, or an encoder too fine for its travel.
-
-    Parameters
-    ----------
-    setpoints
-        Set-points of the move after its start [1].
-    reach_mm
-        Their largest distance from zero [mm].
-    axis, timing
-        As for `busplan.servo.axis.simulate_axis`.
-    """
+    """Refuse a move with too many steps for memory, or an encoder too fine for its travel."""
     steps = setpoints * timing.steps_per_period
     if steps > MAX_STEPS:
         right = f"the move takes {steps} steps, more than {MAX_STEPS}; choose a longer step or a shorter move"
@@ -136,15 +112,7 @@ def unfit_steps(setpoints: int, *, reach_mm: float, axis: Axis, timing: LoopTimi
 
 
 def out_of_reach(axis: Axis, *, name: str, feed_mm_per_min: float) -> Iterator[Refused]:
-    """Refuse a drive that cannot reach the feed in both directions.
-
-    Parameters
-    ----------
-    axis, name
-        The axis, and what to call it.
-    feed_mm_per_min
-        Speed along the path [mm/min].
-    """
+    """Refuse a drive that cannot reach the feed in both directions."""
     highest_mm_s, offset_mm_s = axis.highest_command_mm_s, abs(axis.drive_offset_mm_s)
     levels = f" and dac_bits = {axis.dac_bits}" if axis.dac_bits else ""
     if offset_mm_s >= highest_mm_s:
@@ -166,15 +134,7 @@ def out_of_reach(axis: Axis, *, name: str, feed_mm_per_min: float) -> Iterator[R
 
 
 def unfit_delivery(delivery: Delivery, *, period_us: float) -> Iterator[Refused]:
-    """Refuse a delivery that would change the order of packets: jitter and skew beyond half the period.
-
-    Parameters
-    ----------
-    delivery
-        Jitter and skew.
-    period_us
-        Communication period [us].
-    """
+    """Refuse a delivery that would change the order of packets: jitter and skew beyond half the period."""
     if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
         both = f"{delivery.jitter_us} and skew_us = {delivery.skew_us}"
         right = f"together they must not exceed half the period, {period_us / 2:g} us"

@@ -29,8 +29,8 @@ from busplan.questions.fit.circle_setup import (
 from busplan.questions.fit.figures import FitFigures, figures
 from busplan.questions.fit.network import at_periods
 from busplan.sections.machine import CONTOUR_MEASURES
+from busplan.servo.axis import compiled_kernel
 from busplan.servo.circle import CircleRun, simulate_circle
-from busplan.servo.engine import compiled_kernel
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath, circle_path
 from busplan.servo.runnable import MAX_SETPOINTS

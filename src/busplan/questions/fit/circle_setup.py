@@ -12,8 +12,18 @@ from busplan.questions.fit.certainty import available_us, deciding_cycle, fits_i
 from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import LARGEST, ParameterError, Refused, dividing_step_us, parameters
-from busplan.servo.parameters import FINEST_ENCODER_MM, LONGEST_DELAY_PERIODS, Axis, Delivery, LoopTiming
+from busplan.servo.parameters import (
+    FINEST_ENCODER_MM,
+    LARGEST,
+    LONGEST_DELAY_PERIODS,
+    Axis,
+    Delivery,
+    LoopTiming,
+    ParameterError,
+    Refused,
+    dividing_step_us,
+    parameters,
+)
 from busplan.servo.runnable import (
     LONGEST_SETTLING_US,
     Move,
@@ -286,7 +296,7 @@ def path_settling_us(network: Network) -> float | None:
     profile = network.profile
     if profile.circle.path == "trapezoid":
         return None
-    from busplan.servo.measured_part import REST_MM, settling_time_us  # loads numpy, which only a lead-in needs
+    from busplan.servo.path import REST_MM, settling_time_us  # loads numpy, which only a lead-in needs
 
     tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
     least_mm = min((tolerance_mm for tolerance_mm in tolerances_mm if tolerance_mm), default=None)

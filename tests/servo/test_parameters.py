@@ -8,8 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.servo.checks import ParameterError, Refused, dividing_step_us, no_multiple, parameters
-from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.parameters import (
+    Axis,
+    Delivery,
+    LoopTiming,
+    Mechanics,
+    ParameterError,
+    Refused,
+    dividing_step_us,
+    no_multiple,
+    parameters,
+)
 
 
 @pytest.mark.parametrize("of", [Axis, Delivery, Mechanics])
