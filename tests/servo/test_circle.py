@@ -310,11 +310,11 @@ def test_a_table_that_runs_away_has_diverged() -> None:
     assert a_run(runaway).diverged
 
 
-def test_a_feed_beyond_the_drive_is_refused_axis_by_axis() -> None:
+def test_a_feed_beyond_the_drive_is_refused_axis_by_axis_and_beside_a_late_delivery() -> None:
     slow = an_axis(max_velocity_mm_s=90.0)
     with pytest.raises(BusplanError) as caught:
-        a_run(an_axis(max_velocity_mm_s=101.0, drive_offset_mm_s=-2.0), slow)
-    assert len(caught.value.problems) == 2
+        a_run(an_axis(max_velocity_mm_s=101.0, drive_offset_mm_s=-2.0), slow, delivery=Delivery(jitter_us=501.0))
+    assert len(caught.value.problems) == 3
     assert "axis x reaches 5940 mm/min" in caught.value.problems[0]
     assert "axis y reaches 5400 mm/min" in caught.value.problems[1]
 
