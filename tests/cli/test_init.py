@@ -46,6 +46,11 @@ def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tm
     data = tomllib.loads((tmp_path / "gantry.toml").read_text(encoding="utf-8"))
     assert (data["bus"]["nodes"], data["node"]["axes"], data["cycle"]["period_us"]) == (6, 4, 1000)
     assert (data["payload"]["read_bytes_per_axis"], data["payload"]["write_bytes_per_axis"]) == (8, 8)
+    first, second, *_ = (tmp_path / "gantry.toml").read_text(encoding="utf-8").splitlines()
+    (command,) = re.findall("`busplan (schema) > busplan.schema.json`", second)
+    (tmp_path / first.removeprefix("#:schema ")).write_text(run(command).stdout, encoding="utf-8")
+    schema = ("--schemafile", "busplan.schema.json", "gantry.toml")
+    assert run(*schema, python=("-m", "check_jsonschema"), cwd=tmp_path).returncode == 0
     assert (data["limits"]["reserve"], data["circle"]["path"]) == (0.15, "iso230-4")
     # Nobody invented how round its circle must be.
     assert "tolerance" not in data
@@ -198,7 +203,7 @@ def test_init_starts_from_the_shipped_profile_that_is_asked_for(run: Run, tmp_pa
     assert (done.returncode, done.stdout) == (0, "")
     assert name_in(tmp_path / "sub" / "press.toml") == "press"
     text = (tmp_path / "sub" / "press.toml").read_text(encoding="utf-8")
-    assert text.startswith("# A copy of the shipped profile paper-dma: its values stay those until you change them.\n")
+    assert "\n# A copy of the shipped profile paper-dma: its values stay those until you change them.\n" in text
     assert "assumption" in text
 
 

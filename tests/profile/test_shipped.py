@@ -31,7 +31,6 @@ TABLE_1 = [
 
 
 SCHEMA_LINE = "#:schema ./busplan.schema.json\n"
-"""Right in the shipped folder alone: a starter has none."""
 
 
 def text_of(name: str) -> str:
@@ -172,7 +171,8 @@ def test_a_copy_differs_from_its_source_in_the_name_and_in_what_the_gate_was_tol
     for name in NEW_NAMES[:: 1 if source == "paper-4ms" else 7]:
         assert run("init", name, "--from", source, cwd=work).returncode == 0
         text = (work / f"{name}.toml").read_text(encoding="utf-8")
-        copied, _, text_below = text.partition("\n")
+        schema, editor, copied, text_below = text.split("\n", 3)
+        assert (f"{schema}\n", "`busplan schema > busplan.schema.json`" in editor) == (SCHEMA_LINE, True)
         assert copied == f"# A copy of the shipped profile {source}: its values stay those until you change them."
         source_text = text_of(source).removeprefix(SCHEMA_LINE)
         changed = [

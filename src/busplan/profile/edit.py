@@ -31,7 +31,6 @@ from busplan.profile.document import (
 )
 from busplan.profile.kinds import flat, holder, named_path, path_of
 from busplan.profile.places import KeyPath, Place
-from busplan.profile.sources import SHIPPED_SCHEMA
 from busplan.sections.profile import Profile
 
 
@@ -221,9 +220,8 @@ def edited_copy(loaded: LoadedProfile, choices: Mapping[str, object]) -> bytes:
     choices
         New value by dotted key, as for `edited_file`.
     """
-    text = loaded.document.text.removeprefix(SHIPPED_SCHEMA)
     try:
-        return edited_file(text.encode(), choices, name=loaded.document.name, are_choices=True)
+        return edited_file(loaded.document.text.encode(), choices, name=loaded.document.name, are_choices=True)
     except BusplanError:
         return profile_text(override(loaded.profile, dict(choices))).encode()
 

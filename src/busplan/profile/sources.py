@@ -13,9 +13,6 @@ from busplan.english import printable
 from busplan.errors import BusplanError
 from busplan.profile.document import MAX_FILE_BYTES, LoadedProfile, decode, read_bytes, too_large, validate
 
-SHIPPED_SCHEMA: Final = "#:schema ./busplan.schema.json\n"
-"""First line of a shipped profile: the path is valid only in its folder."""
-
 
 @cache
 def shipped_folder() -> Path:

@@ -9,9 +9,12 @@ from busplan.english import did_you_mean
 from busplan.errors import BusplanError, PlacedError
 from busplan.profile.document import decode, read_bytes, validate
 from busplan.profile.edit import short_text, value_text
-from busplan.profile.sources import SHIPPED_SCHEMA, locate, shipped_names
+from busplan.profile.sources import locate, shipped_names
 from busplan.servo.parameters import dividing_step_us
 
+_SCHEMA: Final = "#:schema ./busplan.schema.json\n"
+"""First line of a profile, for editors: the JSON Schema beside it."""
+_EDITOR: Final = "# `busplan schema > busplan.schema.json` writes that file: an editor then completes and checks the keys.\n"
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
 _TURN: Final = 'path = "iso230-4"          # one whole turn is measured, after a lead-in; the paper has a "trapezoid"\n'
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
@@ -21,7 +24,7 @@ _LONGEST_STEP_US: Final = 100.0
 """Longest position-loop period of a new profile."""
 _COMMENTS_AT: Final = 27
 """Column of the comments of a new profile."""
-_MACHINE: Final = """\
+_MACHINE: Final = f"{_SCHEMA}{_EDITOR}" + """\
 schema_version = 1
 name = {name}
 description = "A new machine: what is assumed here stays so until somebody measures it"
@@ -236,7 +239,5 @@ def starter_text(source: str, *, name: str) -> str:
     if ("circle", "path") not in document.places:
         after = _CIRCLE.sub(rf"\1{_TURN}", after)
     text = before + value_text(name) + after
-    text = text.removeprefix(SHIPPED_SCHEMA)
-    return _checked(
-        f"# A copy of the shipped profile {source}: its values stay those until you change them.\n{text}", name=name
-    )
+    copied = f"# A copy of the shipped profile {source}: its values stay those until you change them.\n"
+    return _checked(f"{_SCHEMA}{_EDITOR}{copied}{text.removeprefix(_SCHEMA)}", name=name)
