@@ -547,9 +547,15 @@ def action_step(run: Busplan) -> Step:
 
 
 @pytest.mark.parametrize(
-    ("schema", "files"), [("github-actions", "action.yml"), ("github-workflows", ".github/workflows/*.yml")]
+    ("schema", "files"),
+    [
+        ("github-actions", "action.yml"),
+        ("github-workflows", ".github/workflows/*.yml"),
+        ("github-issue-forms", ".github/ISSUE_TEMPLATE/*.yml"),
+        ("citation-file-format", "CITATION.cff"),
+    ],
 )
-def test_the_action_and_the_workflows_are_valid(run: Busplan, tmp_path: Path, schema: str, files: str) -> None:
+def test_what_other_programs_read_is_valid(run: Busplan, tmp_path: Path, schema: str, files: str) -> None:
     paths = map(str, ROOT.glob(files))
     done = run("--builtin-schema", f"vendor.{schema}", *paths, python=("-m", "check_jsonschema"), cwd=tmp_path)
     assert done.returncode == 0, done.stdout
