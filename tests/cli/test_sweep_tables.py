@@ -7,16 +7,18 @@ from typing import Any
 
 import pytest
 
+from tests.extras import needed
+
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
 
 def parquet(path: Path) -> Any:
-    return pytest.importorskip("pyarrow.parquet").ParquetFile(path)
+    return needed("pyarrow.parquet").ParquetFile(path)
 
 
 def test_the_ending_chooses_parquet_and_a_pipe_gets_the_same_bytes(run: Run, tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
+    needed("pyarrow")
     grid = ("sweep", "paper-4ms", "--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3")
     done = run(*grid, "-o", "rows.parquet", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, "")
@@ -45,7 +47,7 @@ def test_without_pyarrow_the_extra_is_named_before_any_work(
 
 
 def test_a_terminal_gets_no_parquet(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
+    needed("pyarrow")
     sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet")
     code, shown = on_terminal(*sweep, cwd=tmp_path, env={"COLUMNS": "200"})
     assert (code, shown) == (2, "--format parquet: is not for a terminal; give -o FILE.parquet, or use a pipe\n")

@@ -16,7 +16,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import Axis, LoopTiming
@@ -67,6 +66,8 @@ def deviations(fitted: Sequence[float] | NDArray[np.float64] = CALIBRATED) -> ND
 
 def fit(*, evaluations: int = 30) -> NDArray[np.float64]:
     """The four parameters with the least squared relative deviations, from a rough guess."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - only who fits anew pays
+
     guess = np.array([100.0, 5000.0, 0.4, 1.0])
     solution = least_squares(
         lambda share: deviations(share * guess), np.ones(4), bounds=(0.2, 5.0), diff_step=0.02, max_nfev=evaluations

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from busplan.servo.parameters import Axis, LoopTiming
+from tests.extras import needed
 
 if TYPE_CHECKING:
     import control
@@ -26,13 +26,11 @@ def held(a: Floats, b: Floats, time_s: float) -> tuple[Floats, Floats]:
     size = len(a)
     block = np.zeros((size + 1, size + 1))
     block[:size, :size], block[:size, size] = a, b
-    moved = expm(block * time_s)
+    moved = needed("scipy.linalg").expm(block * time_s)
     return moved[:size, :size], moved[:size, size]
 
 
 def plant(axis: Axis, *, period_s: float, delay_s: float) -> "control.StateSpace":
-    import control  # noqa: PLC0415 - it loads pyplot, and only its own tests pay
-
     """Drive and integrator, sampled, with the command delayed by a part of the period."""
     lag_s = axis.drive_lag_us / 1e6
     if lag_s:
@@ -45,12 +43,11 @@ def plant(axis: Axis, *, period_s: float, delay_s: float) -> "control.StateSpace
     size = len(a)
     transition = np.zeros((size + 1, size + 1))
     transition[:size, :size], transition[:size, size] = whole, rest @ early
-    return control.ss(transition, np.append(late, 1.0)[:, None], np.eye(1, size + 1), 0, period_s)
+    return needed("control").ss(transition, np.append(late, 1.0)[:, None], np.eye(1, size + 1), 0, period_s)
 
 
 def open_loop(axis: Axis, timing: LoopTiming) -> "control.StateSpace":
-    import control  # noqa: PLC0415
-
+    control = needed("control")  # it loads pyplot, and only its own tests pay
     period_s = timing.control_period_us / 1e6
     delay_s = axis.delay_us / 1e6 if timing.loop == "host" else 0.0
     # A delay of whole periods and a rest: each period is a shift.

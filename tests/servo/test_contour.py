@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.optimize import least_squares
 
 from busplan.servo.contour import contour_error, covered_deg, measure_contour
+from tests.extras import needed
 
 ANGLE = np.linspace(0.3, 0.3 + 2 * np.pi, 70_000, endpoint=False)
 """A whole turn, in more points than one block holds."""
@@ -22,6 +22,7 @@ def test_a_nanometre_is_found_on_a_metre(a: float, b: float, deviation: float) -
 
 
 def test_the_fit_is_scipys() -> None:
+    least_squares = needed("scipy.optimize").least_squares
     random = np.random.default_rng(5)
     distance = 20 + 0.5 * random.standard_normal(400)
     angle = random.uniform(0, 4, 400)

@@ -14,6 +14,7 @@ from busplan.servo.axis import simulate_axis
 from busplan.servo.delivery import Arrivals, arrivals
 from busplan.servo.margins import loop_margins
 from busplan.servo.parameters import Axis, Delivery, LoopTiming
+from tests.extras import needed
 
 if TYPE_CHECKING:
     import control
@@ -85,8 +86,7 @@ def test_the_simulated_frequency_response_is_the_loops(reference_loop: Loop) -> 
 def test_the_margins_are_python_controls(
     reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, delay_us: float
 ) -> None:
-    import control  # noqa: PLC0415 - it loads pyplot
-
+    control = needed("control")
     axis = an_axis(**controller, delay_us=delay_us)
     found = loop_margins(axis, timing=timing)
     # Sampled finely: its polynomials in z lose too many digits for these loops, and it says so.
@@ -108,8 +108,7 @@ def test_the_margins_are_python_controls(
 @pytest.mark.parametrize("kp", [20.0, 143.0, 400.0, 1500.0])
 @pytest.mark.parametrize("lag_us", [0.0, 3000.0, 20_000.0])
 def test_a_host_that_is_one_period_late_is_python_controls_own_sampling_and_a_delay(kp: float, lag_us: float) -> None:
-    import control  # noqa: PLC0415 - it loads pyplot
-
+    control = needed("control")
     period_s = HOST.period_us / 1e6
     drive = control.tf([1], [lag_us / 1e6, 1, 0] if lag_us else [1, 0])
     loop = kp * control.sample_system(drive, period_s, method="zoh") * control.tf([1], [1, 0], period_s)

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pandas as pd
-import polars as pl
 import pytest
 
 import busplan
+from tests.extras import needed
 
 GRID: Mapping[str, Any] = {
     "bus.gap_count": [63, "optimal"],
@@ -83,6 +82,7 @@ def test_whole_numbers_as_floats_count_nodes() -> None:
 
 
 def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
+    pd, pl, _ = map(needed, ("pandas", "polars", "pyarrow"))
     answer = busplan.sweep("paper-4ms", vary={**GRID, "cycle.nonperiodic_us": range(1500)})
     arrow, pandas, polars = answer.to_arrow(), answer.to_pandas(), answer.to_polars()
     assert list(pandas) == polars.columns == arrow.column_names == list(answer)
@@ -100,6 +100,7 @@ def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
 
 
 def test_pandas_makes_no_column_of_the_names() -> None:
+    pd, pl = needed("pandas"), needed("polars")
     answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
     with pytest.raises(busplan.BusplanError, match=r"to_pandas\(\) gives a data frame, dict\(answer\) a dict"):
         pd.DataFrame(answer)
@@ -109,6 +110,7 @@ def test_pandas_makes_no_column_of_the_names() -> None:
 
 
 def test_pandas_needs_no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    needed("pandas")
     for name in ("pyarrow", "pyarrow.parquet"):
         monkeypatch.setitem(sys.modules, name, None)
     answer = busplan.sweep("paper-4ms", vary={"bus.gap_count": [63, "optimal"], "bus.cycle_master": [True, False]})
@@ -121,7 +123,7 @@ def test_pandas_needs_no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_xarray_has_a_dimension_for_each_key() -> None:
-    xarray = pytest.importorskip("xarray")
+    xarray = needed("xarray")
     answer = busplan.sweep("paper-4ms", vary=GRID)
     dataset = answer.to_xarray()
     assert isinstance(dataset, xarray.Dataset)

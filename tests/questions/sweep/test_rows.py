@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import busplan
+from tests.extras import needed
 
 GRIDS: dict[str, tuple[str, dict[str, Any]]] = {
     "decimals": ("paper-4ms", {"cycle.period_us": "100:135.5:1.7"}),
@@ -80,7 +81,7 @@ VARY: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def parquet(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    pytest.importorskip("pyarrow")
+    needed("pyarrow")
     return saved(busplan.sweep("paper-4ms", vary=VARY), tmp_path_factory.mktemp("rows") / "rows.parquet")
 
 
@@ -95,7 +96,7 @@ def expected() -> dict[str, list[object]]:
 
 
 def test_pandas_reads_the_figures_of_the_document(parquet: bytes) -> None:
-    pandas = pytest.importorskip("pandas")
+    pandas = needed("pandas")
     frame = pandas.read_parquet(BytesIO(parquet))
     wanted = expected()
     assert list(frame) == list(wanted)
@@ -109,7 +110,7 @@ def test_pandas_reads_the_figures_of_the_document(parquet: bytes) -> None:
 
 
 def test_the_schema_says_what_the_rows_are_of(parquet: bytes) -> None:
-    schema = pytest.importorskip("pyarrow.parquet").read_schema(BytesIO(parquet))
+    schema = needed("pyarrow.parquet").read_schema(BytesIO(parquet))
     assert tomllib.loads(schema.metadata[b"busplan.profile"].decode())["name"] == "paper-4ms"
     facts = json.loads(schema.metadata[b"busplan.sweep"])
     document = busplan.sweep("paper-4ms", vary=VARY).to_dict()
@@ -122,13 +123,13 @@ def test_the_schema_says_what_the_rows_are_of(parquet: bytes) -> None:
 
 
 def test_truths_that_vary_are_truths() -> None:
-    pytest.importorskip("pyarrow")
+    needed("pyarrow")
     table = busplan.sweep("paper-4ms", vary={"bus.cycle_master": (False, True)}).to_arrow()
     assert table["bus.cycle_master"].to_pylist() == [False, True]
 
 
 def test_counts_of_groups_and_figures_of_circles_are_typed() -> None:
-    pa = pytest.importorskip("pyarrow")
+    pa = needed("pyarrow")
     table = busplan.sweep("gantry-24", vary={"cycle.period_us": (500, 1000)}).to_arrow()
     counts = [name for name in table.column_names if name.endswith("safe_nodes")]
     assert len(counts) == 4
