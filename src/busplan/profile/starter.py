@@ -14,7 +14,7 @@ from busplan.servo.parameters import dividing_step_us
 
 _SCHEMA: Final = "#:schema ./busplan.schema.json\n"
 """First line of a profile, for editors: the JSON Schema beside it."""
-_EDITOR: Final = "# `busplan schema > busplan.schema.json` writes that file: an editor then completes and checks the keys.\n"
+_EDITOR: Final = "# `busplan schema > busplan.schema.json` writes it; an editor then completes and checks the keys.\n"
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
 _TURN: Final = 'path = "iso230-4"          # one whole turn is measured, after a lead-in; the paper has a "trapezoid"\n'
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
