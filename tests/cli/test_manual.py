@@ -1,4 +1,4 @@
-"""`busplan manual`: the reference pages as they ship, and a list of them."""
+"""`busplan manual`: the reference pages with their tables, and a list of them."""
 
 import re
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from busplan.manual import FOLDER, topics
+from busplan.manual import FOLDER, page, topics
 
 Run = Callable[..., CompletedProcess[str]]
 Refused = Callable[..., str]
@@ -28,15 +28,18 @@ def test_without_a_topic_it_lists_them_a_line_each_and_says_how_to_show_one(run:
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_a_topic_is_its_page_as_it_ships(run: Run, topic: str, tmp_path: Path) -> None:
-    page = (FOLDER / f"{topic}.md").read_text(encoding="utf-8")
+def test_a_topic_is_its_page_with_tables_for_their_places(run: Run, topic: str, tmp_path: Path) -> None:
     done = run("manual", topic)
-    assert (done.returncode, done.stdout, done.stderr) == (0, page, "")
+    shown = done.stdout
+    assert (done.returncode, done.stderr) == (0, "")
+    prose = re.split("^> .*\n", (FOLDER / f"{topic}.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    between = r"(?:\|.*\n){3,}"
+    assert re.fullmatch(between.join(map(re.escape, prose)), shown)
     for name in ("x.md", "x"):
         (tmp_path / name).write_text("old", encoding="utf-8")
         done = run("manual", topic, "-o", name, cwd=tmp_path)
         assert (done.returncode, done.stdout, done.stderr) == (0, "", f"wrote {name}\n")
-        assert (tmp_path / name).read_text(encoding="utf-8") == page
+        assert (tmp_path / name).read_text(encoding="utf-8") == shown
 
 
 def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
@@ -54,7 +57,7 @@ def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
     assert "cycle.nonperiodic_us" in column
     # A file gets Markdown.
     code, _ = on_terminal("manual", "profile", "-o", "x.md", cwd=tmp_path)
-    assert (tmp_path / "x.md").read_text(encoding="utf-8") == (FOLDER / "profile.md").read_text(encoding="utf-8")
+    assert (tmp_path / "x.md").read_text(encoding="utf-8") == page("profile")
 
 
 def test_a_card_of_80_columns_is_not_broken_on_a_terminal_of_80(

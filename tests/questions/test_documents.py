@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import busplan
 from busplan.cli import app
-from busplan.manual import FOLDER
+from busplan.manual import page, topics
 
 # One of each other class of bus, and one of groups.
 OTHERS = ("dvrk", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
@@ -152,7 +152,7 @@ def test_the_manual_or_the_registered_figures_have_each_key() -> None:
         busplan.circle_test(busplan.load_profile("paper-1ms", changes=tight)).to_dict(),
     ]
     figures = {row["figure"] for row in busplan.explain("paper-4ms").to_dict()["figures"]}
-    pages = "".join(page.read_text(encoding="utf-8") for page in FOLDER.glob("*.md"))
+    pages = "".join(map(page, topics()))
     named = set(re.findall(r"[\w.]+", " ".join(re.findall(r"`([^`\n]+)`", pages))))
     unknown = {key for key in keys_of(documents) if "." not in key} - named - figures
     assert not unknown

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 import busplan
+from tests.extras import needed
 
 Run = Callable[..., object]
 COMMANDS: Mapping[str, Callable[[], Any]] = {
@@ -27,6 +28,8 @@ FILES = [
 
 @pytest.mark.parametrize(("command", "ending"), FILES)
 def test_a_file_has_the_bytes_that_the_command_writes(command: str, ending: str, run: Run, tmp_path: Path) -> None:
+    if ending == ".parquet":
+        needed("pyarrow")
     theirs, ours = tmp_path / f"theirs{ending}", tmp_path / f"ours{ending.upper()}"
     run(*command.split(), "-o", str(theirs), cwd=tmp_path)
     ours.write_text("old")

@@ -1,4 +1,4 @@
-"""Write what the program prints today into the README and the manual: output blocks, tables, pictures.
+"""Write what the program prints today into the README and the manual: output blocks and pictures.
 
     python tests/readme/refresh.py
 
@@ -39,23 +39,19 @@ def output_of(command: str) -> str:
     return run.stdout + run.stderr
 
 
-def refreshed(page: str, tests: ModuleType) -> str:
+def refreshed(page: str) -> str:
     """A page with everything that is checked brought up to date."""
 
     def block(match: re.Match[str]) -> str:
         commands = re.findall(r"^\$ (.*)$", match[1], re.MULTILINE)
         return "```console\n" + "".join(f"$ {command}\n{output_of(command)}" for command in commands) + "```"
 
-    page = re.sub(r"^```console\n(.*?)^```$", block, page, flags=re.MULTILINE | re.DOTALL)
-    for lines in tests.tables():
-        old = tests.shown_table(lines[0], page)
-        page = page.replace(old, "".join(f"{line}\n" for line in lines)) if old else page
-    return page
+    return re.sub(r"^```console\n(.*?)^```$", block, page, flags=re.MULTILINE | re.DOTALL)
 
 
 if __name__ == "__main__":
     tests = checks()
     for path, page in tests.PAGES.items():
-        path.write_text(refreshed(page, tests), encoding="utf-8")
+        path.write_text(refreshed(page), encoding="utf-8")
     for name, command in tests.pictures().items():
         output_of(command.replace(name, str(tests.FOLDER / name)))

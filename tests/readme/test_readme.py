@@ -2,31 +2,23 @@
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from subprocess import CompletedProcess
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Any
 
 import pytest
-from pydantic import BaseModel
 from typer.testing import CliRunner
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.buses.figure import Figure
 from busplan.cli import app
-from busplan.forms.markdown import code, table
-from busplan.manual import FOLDER, topics
+from busplan.manual import FOLDER, page, topics
+from busplan.manual.tables import made_table
 from busplan.profile.document import decode, validate
-from busplan.profile.kinds import models_of
 from busplan.profile.sources import load
-from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.explain.derivation import figures_of
-from busplan.questions.explain.report import constant_rows, equation_rows
-from busplan.sections.machine import AxisOverride
-from busplan.sourced import short
+from busplan.questions.explain.report import constant_rows
 from tests.registers import COMMANDS
 
 Run = Callable[..., CompletedProcess[str]]
@@ -41,6 +33,10 @@ MOST_README_BYTES = 8_192
 GALLERY = FOLDER / "commands.md"
 MOST_PICTURE_BYTES = 150_000
 """They ship with the package."""
+
+
+SHOWN_FIRST = "ieee1394"
+"""The kind whose keys and figures the pages show; the page of a further kind shows what keys it has beside them."""
 
 
 @pytest.fixture(autouse=True)
@@ -111,173 +107,42 @@ def test_there_are_blocks_to_check() -> None:
     assert commands >= {"capacity", "latency", "explain", "paper", "init", "rule"}
 
 
-def sections(annotation: Any) -> list[type[BaseModel]]:
-    """Models inside an annotation: the section itself, or each member of a union of sections."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    if get_origin(annotation) in (Union, UnionType, Annotated):
-        return [model for part in get_args(annotation) for model in sections(part)]
-    return []
+def schema_keys(schema: dict[str, Any], definitions: dict[str, Any], prefix: str = "") -> Iterator[str]:
+    """Every key of a JSON Schema that has a value and no further keys."""
+    schema = definitions[schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema
+    for name, inner in schema.get("properties", {}).items():
+        yield from list(schema_keys(inner, definitions, f"{prefix}{name}.")) or [f"{prefix}{name}"]
+    for inner in filter(None, (*schema.get("anyOf", ()), *schema.get("oneOf", ()), schema.get("items"))):
+        yield from schema_keys(inner, definitions, prefix)
 
 
-def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """A row for every key of the profile, from the schema itself."""
-    for name, field in model.model_fields.items():
-        key = f"{prefix}{name}"
-        inner = sections(field.annotation)
-        if name == "message":
-            (message,) = models_of(field.annotation)
-            yield from (reference_row(message, own, f"message.NAME.{own}") for own in message.model_fields)
-        elif name == "group":
-            (group,) = models_of(field.annotation)
-            owns = [one for one in ("name", "nodes", "axes", "hops") if one in group.model_fields]
-            yield from (reference_row(group, own, f"group.NAME.{own}") for own in owns)
-            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | As there, for its nodes |"
-        elif name == "grades":
-            yield f"| `{key}.KEY` | {grades(inner[0])} | How servo.KEY is known, where not as servo.grade says |"
-        elif inner == [AxisOverride]:
-            yield f"| `{key}` | any key of one axis | {field.description} |"
-        elif inner:
-            for one in inner:
-                yield from reference(one, f"{key}.")
-        else:
-            yield reference_row(model, name, key)
+NAMED = r"(group|message)\.|servo\.(x|y|grades)\."
+"""Keys of a table that a profile has several times, or for each other key: the manual shows a pattern."""
 
 
-def grades(model: type[BaseModel]) -> str:
-    """What each key of a section of grades takes; all take the same."""
-    (values,) = {allowed(schema) for schema in properties(model).values()}
-    return values
+@pytest.mark.parametrize("kind", kind_names())
+def test_the_manual_has_each_key_of_the_schema_and_no_other(kind: str) -> None:
+    schema = kind_named(kind).profile_model().model_json_schema()
+    keys = {key for key in schema_keys(schema, schema["$defs"]) if not re.match(NAMED, key)}
+    own, common = ({row.split("`")[1] for row in made_table("keys", of)[2:]} for of in (kind, SHOWN_FIRST))
+    assert keys - own - common == set()
+    assert {key for key in own if not re.match(NAMED, f"{key}.")} - keys == set()
 
 
-def reference_row(model: type[BaseModel], name: str, key: str) -> str:
-    """One row of the reference, without the unit that the key ends in."""
-    field = model.model_fields[name]
-    values = allowed(properties(model)[name])
-    if key == "bus.nodes":
-        values = f"{values}, required without groups"
-    elif field.is_required():
-        values = f"{values}, required"
-    elif (default := field.get_default(call_default_factory=True)) is not None:
-        values = f"{values} ({json.dumps(default)})"
-    meaning = re.sub(r" \[[^]]*\]$", "", field.description or "")
-    return f"| `{key}` | {values} | {meaning} |"
-
-
-@cache
-def properties(model: type[BaseModel]) -> dict[str, Any]:
-    """JSON Schema of each key of a section."""
-    found: dict[str, Any] = model.model_json_schema()["properties"]
-    return found
-
-
-def allowed(schema: dict[str, Any]) -> str:
-    """Type and range of a key in words, from its JSON Schema."""
-    if "anyOf" in schema:
-        return " or ".join(allowed(one) for one in schema["anyOf"] if one.get("type") != "null")
-    if "enum" in schema or "const" in schema:
-        return ", ".join(str(one) for one in schema.get("enum", [schema.get("const")]))
-    if schema["type"] == "boolean":
-        return "true, false"
-    if schema["type"] == "array":
-        return f"list of {allowed(schema['items'])}"
-    if schema["type"] == "string":
-        letters = " of letters, digits, - and _" if schema.get("pattern", "").startswith("^[A-Za-z]") else ""
-        return f"text up to {schema['maxLength']} characters{letters}"
-    return number(schema)
-
-
-MOST = 1_000_000
-"""Largest values from here on are left to the JSON Schema."""
-
-
-def number(schema: dict[str, Any]) -> str:
-    """Range of a number in words."""
-    whole = "whole " if schema["type"] == "integer" else ""
-    if schema.get("minimum", 0) <= -MOST:
-        return f"{whole}number"
-    is_open = schema["maximum"] >= MOST
-    if "exclusiveMinimum" in schema:
-        least = f"over {schema['exclusiveMinimum']:g}"
-        return f"{whole}{least}" if is_open else f"{whole}{least}, to {schema['maximum']:g}"
-    return f"{whole}{schema['minimum']:g} " + ("or more" if is_open else f"to {schema['maximum']:g}")
-
-
-SHOWN_FIRST = "ieee1394"
-"""The kind whose keys and figures the pages show; the page of a further kind shows what keys it has beside them."""
-
-
-def constants_table(kind: str) -> list[str]:
-    """Constants of a kind that nobody has published; `explain` has all of them, with their sources."""
-    cells = [
-        [code(row["name"]), f"{short(row['value'])} {row['unit']}".removesuffix(" 1"), row["grade"], row["meaning"]]
-        for row in constant_rows(kind_named(kind))
-        if row["grade"] != "published"
-    ]
-    return table([f"constant of `{kind}`", "value", "grade", "meaning"], cells, left=4)
-
-
-def figure_table(head: str, figures: Iterable[Figure]) -> list[str]:
-    """What figures mean; their keys end in the unit, and `explain` shows their symbols."""
-    cells = ([code(figure.key), figure.meaning, figure.reference] for figure in figures)
-    return table([head, "meaning", "reference"], cells, left=3)
-
-
-def further_tables(kind: str) -> Iterator[list[str]]:
-    """What a further kind of bus has of its own: keys and constants; `explain` lists its figures."""
-    known = set(reference(kind_named("ieee1394").profile_model()))
-    own = [row for row in dict.fromkeys(reference(kind_named(kind).profile_model())) if row not in known]
-    yield [f"| key of `{kind}` | values (default) | meaning |", "|---|---|---|", *own]
-    yield constants_table(kind)
-
-
-OTHER_FIGURE = "other figure"
-
-
-@cache
-def explained_keys() -> frozenset[str]:
-    """Figures of the page's kind that `explain` lists, with their meaning."""
-    return frozenset(figure.key for _, figure in busplan.explain("paper-4ms").figures)
-
-
-def tables() -> Iterator[list[str]]:
-    """Every table of the program's own data, by its lines; the first of them is in one page alone."""
-    yield [
-        "| key | values (default) | meaning |",
-        "|---|---|---|",
-        *dict.fromkeys(reference(kind_named("ieee1394").profile_model())),
-    ]
-    equations = (
-        [row["reference"], code(row["formula"]), re.sub("Paper, section |, equations? [^;]*", "", row["source"])]
-        for row in equation_rows()
+@pytest.mark.parametrize("topic", topics())
+def test_a_page_is_shown_with_the_tables_that_it_asks_for(topic: str) -> None:
+    asked = [line for line in PAGES[FOLDER / f"{topic}.md"].splitlines() if " has a table here: " in line]
+    assert [line for line in asked if f"`busplan manual {topic}`" not in line] == []
+    shown = page(topic)
+    assert "has a table here" not in shown
+    assert len(re.findall(r"^\| ?:?-", shown, re.MULTILINE)) == len(asked) + len(
+        re.findall(r"^\| ?:?-", PAGES[FOLDER / f"{topic}.md"], re.MULTILINE)
     )
-    yield table(["equation", "formula", "section of the paper"], equations, left=3)
-    yield constants_table(SHOWN_FIRST)
-    explained = explained_keys()
-    figures = {
-        figure.key: figure
-        for register in figures_of(kind_named(SHOWN_FIRST)).values()
-        for figure in register.values()
-        if figure.key not in explained
-    }
-    yield figure_table(OTHER_FIGURE, figures.values())
-    yield figure_table("`circle-test`", CIRCLE_BY_KEY.values())
-    for kind in kind_names():
-        if kind != SHOWN_FIRST:
-            yield from further_tables(kind)
 
 
-def shown_table(head: str, page: str) -> str:
-    """A page's table whose first line begins with the same cell; empty where it has none."""
-    cell = head.split("|")[1]
-    found = re.search(f"^\\|{re.escape(cell)}\\|.*\n\\| ?:?-.*\n(?:\\|.*\n)*", page, re.MULTILINE)
-    return found[0] if found else ""
-
-
-def test_tables_are_those_of_the_program() -> None:
-    for lines in tables():
-        (found,) = filter(None, (shown_table(lines[0], text) for text in PAGES.values()))
-        assert found.splitlines() == lines
+def test_the_manual_asks_for_the_keys_and_constants_of_each_kind() -> None:
+    for what in ("keys", "constants"):
+        assert sorted(re.findall(rf"table here: {what} of `(\w+)`", "".join(PAGES.values()))) == sorted(kind_names())
 
 
 def test_the_command_that_a_page_names_has_all_constants_and_the_kind_s_own_figures() -> None:
@@ -342,12 +207,9 @@ def keys_of(document: object) -> Iterator[str]:
 
 def figure_keys() -> str:
     """Keys of figures, which mean the same in every document: those of `explain`, and first cells of the tables."""
-    tables_of_figures = (
-        shown_table(f"| {OTHER_FIGURE} |", PAGES[FOLDER / "models.md"]),
-        shown_table("| `circle-test` |", PAGES[FOLDER / "circle.md"]),
-    )
-    rows = (row for shown in tables_of_figures for row in shown.splitlines())
-    return "".join(row.split("|")[1] for row in rows) + "".join(map("`{}`".format, explained_keys()))
+    rows = [*made_table("other figures", ""), *made_table("figures", "circle-test")]
+    explained = (figure.key for _, figure in busplan.explain("paper-4ms").figures)
+    return "".join(row.split("|")[1] for row in rows) + "".join(map("`{}`".format, explained))
 
 
 def json_section(command: str) -> str:

@@ -66,6 +66,7 @@ def open_loop(axis: Axis, timing: LoopTiming) -> "control.StateSpace":
 @pytest.fixture(scope="session")
 def reference_loop() -> Loop:
     """The open position loop, sampled; from its description, not from busplan's formulas."""
+    needed("control")
     return open_loop
 
 

@@ -1,14 +1,18 @@
 """The reference pages: Markdown files next to this module, one for each topic.
 
-The repository shows them, the README links to them, and `busplan manual TOPIC` prints them.
+The repository shows their prose, and the README links to it. `busplan manual TOPIC` prints a page with the tables that
+it asks for, made from the program; a build that publishes pages takes them from there, too.
 """
 
+import re
 from pathlib import Path
 from typing import Final
 
 FOLDER: Final = Path(__file__).parent
 """Folder of the pages."""
 _HEADING: Final = "# "
+_TABLE: Final = re.compile(r"^> `busplan manual \w+` has a table here: ([a-z ]+?)(?: of `([\w-]+)`)?\.$", re.MULTILINE)
+"""Place of a table in a page: what it has, and of which kind of bus or command."""
 
 
 def topics() -> dict[str, str]:
@@ -28,7 +32,7 @@ def topics() -> dict[str, str]:
 
 
 def page(topic: str) -> str:
-    """Read the page of a topic.
+    """Page of a topic, with its tables.
 
     Parameters
     ----------
@@ -45,8 +49,18 @@ def page(topic: str) -> str:
     FileNotFoundError
         There is no such topic.
     """
+    return _TABLE.sub(_table, _prose(topic))
+
+
+def _table(place: re.Match[str]) -> str:
+    from busplan.manual.tables import made_table  # noqa: PLC0415 - most pages have no table, and a list has no page
+
+    return "\n".join(made_table(place[1], place[2] or ""))
+
+
+def _prose(topic: str) -> str:
     return (FOLDER / f"{topic}.md").read_text(encoding="utf-8")
 
 
 def _heading(topic: str) -> str:
-    return page(topic).partition("\n")[0].removeprefix(_HEADING)
+    return _prose(topic).partition("\n")[0].removeprefix(_HEADING)

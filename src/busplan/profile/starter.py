@@ -14,7 +14,9 @@ from busplan.servo.parameters import dividing_step_us
 
 _SCHEMA: Final = "#:schema ./busplan.schema.json\n"
 """First line of a profile, for editors: the JSON Schema beside it."""
-_EDITOR: Final = "# `busplan schema > busplan.schema.json` writes it; an editor then completes and checks the keys.\n"
+_HEAD: Final = f"""\
+{_SCHEMA}# `busplan schema > busplan.schema.json` writes it; an editor then completes and checks the keys.
+"""
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
 _TURN: Final = 'path = "iso230-4"          # one whole turn is measured, after a lead-in; the paper has a "trapezoid"\n'
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
@@ -24,7 +26,7 @@ _LONGEST_STEP_US: Final = 100.0
 """Longest position-loop period of a new profile."""
 _COMMENTS_AT: Final = 27
 """Column of the comments of a new profile."""
-_MACHINE: Final = f"{_SCHEMA}{_EDITOR}" + """\
+_MACHINE: Final = """\
 schema_version = 1
 name = {name}
 description = "A new machine: what is assumed here stays so until somebody measures it"
@@ -148,7 +150,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     starter = kind_named(kind).starter
     first = machine.groups[0]
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
-    text = _MACHINE.format(
+    text = _HEAD + _MACHINE.format(
         name=value_text(name),
         bus=_bus(starter, machine),
         ratio=starter.slice_ratio,
@@ -240,4 +242,4 @@ def starter_text(source: str, *, name: str) -> str:
         after = _CIRCLE.sub(rf"\1{_TURN}", after)
     text = before + value_text(name) + after
     copied = f"# A copy of the shipped profile {source}: its values stay those until you change them.\n"
-    return _checked(f"{_SCHEMA}{_EDITOR}{copied}{text.removeprefix(_SCHEMA)}", name=name)
+    return _checked(f"{_HEAD}{copied}{text.removeprefix(_SCHEMA)}", name=name)
