@@ -15,7 +15,7 @@ from busplan.buses.ieee1394.constants import (
     c,
     padded_bytes,
 )
-from busplan.elementwise import Number, choose, is_off, larger, named, smaller, traced_with, worded
+from busplan.elementwise import Number, choose, is_off, larger, named, smaller, worded
 from busplan.sections.base import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
@@ -95,8 +95,8 @@ class Delays(NamedTuple):
             )
             acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(hops, hop_us=self.hop_us))
         else:
-            arbitration_us = traced_with(c.BETA_ARBITRATION_US, hops)
-            acknowledge_us = traced_with(c.BETA_ACKNOWLEDGE_US, hops)
+            arbitration_us = c.BETA_ARBITRATION_US
+            acknowledge_us = c.BETA_ACKNOWLEDGE_US
         return self._replace(
             link=self.link._replace(hops=hops),
             arbitration_us=named(arbitration_us, "arbitration_us", "ArbP"),
@@ -119,11 +119,11 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
     """
     rate_mbit_s, gap_count = link.data_rate_mbit_s, link.gap_count
     if not link.has_gaps:
-        beta_phy_us = traced_with(c.BETA_PHY_DELAY_US, rate_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
+        beta_phy_us = c.BETA_PHY_DELAY_US if link.phy_delay_us is None else link.phy_delay_us
         hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us), "hop_us", "hop")
         # The next packet need not wait until all nodes have one: only the way to a node and back is surely waited for.
         return Delays(link, rate_mbit_s, Gaps(0.0, 0.0, 0.0, alone), hop_us, 0.0, 0.0, 0).over(0)
-    clock_mbit_s = rate_mbit_s if model == "paper" else traced_with(c.BASE_RATE_MBIT_S, rate_mbit_s)
+    clock_mbit_s = rate_mbit_s if model == "paper" else c.BASE_RATE_MBIT_S
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
     subaction_us = equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
     reset_us = equations.arbitration_reset_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
@@ -240,7 +240,7 @@ def _packet_bytes(kind: TransactionKind, payload_bytes: Number) -> tuple[Number,
         )
     return (
         choose(is_quadlet, c.QUADLET_WRITE_REQUEST_BYTES, c.BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes),
-        worded(traced_with(c.WRITE_RESPONSE_BYTES, payload_bytes), c.WRITE_RESPONSE_BYTES.meaning),
+        worded(c.WRITE_RESPONSE_BYTES, c.WRITE_RESPONSE_BYTES.meaning),
     )
 
 
