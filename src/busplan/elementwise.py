@@ -171,6 +171,7 @@ class TracedConstant(Traced):
 
     @property
     def is_constant(self) -> bool:
+        """True: it is one."""
         return True
 
     @property
