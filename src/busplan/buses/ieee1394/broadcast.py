@@ -228,6 +228,12 @@ class BroadcastCycle(CycleWithStarts):
             transaction_us=latency_us + (self.hub.idle_us + self.hub.host_us),
         )
 
+    def all_us(self, kind: TransactionKind) -> Number:
+        """The broadcasts of all nodes and the read of the hub; or the write of all commands [us]."""
+        if kind == "write":
+            return self.write.transaction_us
+        return self.boards_us + self.hub_wait.us + self.hub.transaction_us
+
     def longest(self, kind: TransactionKind) -> Phases:
         """The read of all data, or the write of all commands [us]."""
         return self.read if kind == "read" else self.write
@@ -236,8 +242,8 @@ class BroadcastCycle(CycleWithStarts):
         """The data of a node to the host, and a command to it; they are those of all nodes."""
         link = {"hops": self.link.hops, "gap_count": self.link.gap_count}
         before_hub = {"query_us": self.query_us, "boards_us": self.boards_us, "hub_wait_us": self.hub_wait.us}
-        read = {**link, **before_hub, **self.read._asdict()}
-        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict()}
+        read = {**link, **before_hub, **self.read._asdict(), "all_us": self.reads_us}
+        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict(), "all_us": self.writes_us}
         return tuple(
             latency
             for group in self.network.groups

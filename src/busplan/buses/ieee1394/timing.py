@@ -261,10 +261,12 @@ class Phases(NamedTuple):
     request_us: Number
     response_us: Number
     request_and_acknowledge_us: Number
+    request_and_acknowledge_eq15_us: Number
     hold_us: Number
     execution_us: Number
     response_and_acknowledge_us: Number
     latency_us: Number
+    interval_latency_us: Number
     subaction_gap_us: Number
     arbitration_reset_gap_us: Number
     gaps_us: Number
@@ -286,7 +288,7 @@ def transaction(
     responder: Responder,
     overhead_bytes: Number = 0,
 ) -> Phases:
-    """Take an asynchronous transaction apart, equations (3)-(10), (13) and (14).
+    """Take an asynchronous transaction apart, equations (3)-(10) and (12)-(15).
 
     Parameters
     ----------
@@ -310,7 +312,7 @@ def transaction(
 
     References
     ----------
-    Paper, equations (3)-(10), (13), (14); packet sizes as in `constants`.
+    Paper, equations (3)-(10), (12)-(15); packet sizes as in `constants`.
 
     Examples
     --------
@@ -358,12 +360,20 @@ def transaction(
         request_us=request_us,
         response_us=response_us,
         request_and_acknowledge_us=equations.request_and_acknowledge_us(request_us, acknowledge_us=acknowledge_us),
+        request_and_acknowledge_eq15_us=equations.published_request_and_acknowledge_us(payload_bytes),
         hold_us=hold_us,
         execution_us=execution_us,
         response_and_acknowledge_us=equations.response_and_acknowledge_us(
             response_us, acknowledge_us=response_acknowledge_us
         ),
         latency_us=latency_us,
+        interval_latency_us=equations.interval_latency_us(
+            delays.arbitration_us,
+            t2_us=request_data_us + acknowledge_us,
+            t3_us=execution_us if is_split else hold_us,
+            t4_us=delays.arbitration_us if is_split else 0.0,
+            t5_us=response_data_us + response_acknowledge_us,
+        ),
         subaction_gap_us=gaps.subaction_us,
         arbitration_reset_gap_us=gaps.arbitration_reset_us,
         gaps_us=gaps.both_us,

@@ -304,7 +304,7 @@ def wanted(name: str, network: Network) -> Wanted:
     if transactions or (name and name in network.names):
         # All other figures of `latency` lead to this one.
         timed = network.bus.figures
-        main = timed.deadlines[0] if timed.deadlines else timed.latency_table[-1].key
+        main = timed.deadlines[0] if timed.deadlines else timed.latency_main or timed.latency_table[-1].key
         return Wanted("latency", (register["latency"][main],), transactions or None)
     raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
 

@@ -11,7 +11,7 @@ from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
-from busplan.buses.time_slice import required_time_slice_us, time_slice_us
+from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,
@@ -461,7 +461,7 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "available_us": given_us,
         "required_us": required_us,
         "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),
-        "required_time_slice_us": required_time_slice_us(required_us, nodes=nodes),
+        "required_time_slice_us": cycle.required_time_slice_us,
         "utilisation": required_us / given_us,
         "margin_us": margin_us(required_us, available_us=given_us),
         "min_period_us": shortest_period_us(network, required_us),
