@@ -2,7 +2,7 @@
 
 Each parameter is a float or an array, and so is the result, in their broadcast shape; times are in us. N is the number
 of distributed nodes, the host not counted, and alpha the share of the period T_s that belongs to communication, 0..1.
-Zero nodes raise ZeroDivisionError. Other buses than IEEE 1394 have other terms in (2): there a node's slice is T_need / N.
+Zero nodes raise ZeroDivisionError. Other buses than IEEE 1394 have other terms: there a node's slice is T_need / N.
 """
 
 from busplan.elementwise import Number
