@@ -5,6 +5,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from tests.extras import needed
+
 
 @pytest.mark.parametrize(
     ("period_us", "feed_mm_per_min", "duration_s", "mean_mm", "max_mm"),
@@ -28,6 +30,7 @@ def test_the_calibrated_axis_meets_the_papers_figures_within_two_percent(
 
 
 def test_the_shipped_set_is_where_the_fit_ends(calibration: ModuleType) -> None:
+    needed("scipy")
     fitted = calibration.fit(evaluations=6)
     assert np.abs(calibration.deviations(fitted)).max() < 5e-3
     np.testing.assert_allclose(fitted, calibration.CALIBRATED, rtol=0.03)
