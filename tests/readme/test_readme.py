@@ -129,6 +129,35 @@ def test_the_manual_has_each_key_of_the_schema_and_no_other(kind: str) -> None:
     assert {key for key in own if not re.match(NAMED, f"{key}.")} - keys == set()
 
 
+@pytest.mark.parametrize(
+    ("key", "values"),
+    {
+        "name": "text up to 100 characters, required",
+        "bus.speed": "S100, S200, S400, S800, S1600, S3200, required",
+        "bus.gap_count": "whole 0 to 63 or optimal (63)",
+        "bus.nodes": "whole 1 or more, required without groups",
+        "bus.cable_length_m": "over 0, to 100 (4.5)",
+        "bus.cycle_master": "true, false (true)",
+        "bus.isochronous_us": "0 to 125 (0.0)",
+        "node.execution.uncertainty_us": "0 or more",
+        "servo.velocity_feedforward": "number (1.0)",
+        "servo.grades.KEY": "published, measured, calibrated, assumed",
+        "circle.ramp_periods": "whole 0 or more (100)",
+        "node.execution.time_us": "list of 0 or more, required",
+        "group.NAME.name": "text up to 40 characters of letters, digits, - and _, required",
+    }.items(),
+)
+def test_the_manual_says_what_a_key_may_have(key: str, values: str) -> None:
+    assert f"\n| `{key}` | {values} | " in page("profile")
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_the_manual_has_the_constants_that_nobody_has_published(kind: str) -> None:
+    rows = [row.split(" | ") for row in made_table("constants", kind)[2:]]
+    unpublished = [(name, one.grade) for name, one in kind_named(kind).constants.items() if one.grade != "published"]
+    assert [(row[0].strip("| `"), row[2]) for row in rows] == unpublished
+
+
 @pytest.mark.parametrize("topic", topics())
 def test_a_page_is_shown_with_the_tables_that_it_asks_for(topic: str) -> None:
     asked = [line for line in PAGES[FOLDER / f"{topic}.md"].splitlines() if " has a table here: " in line]
