@@ -133,7 +133,7 @@ class Limit(ABC):
         return 0.0
 
     def perhaps(self, network: Network) -> Number:  # noqa: ARG002 - most are exact
-        """Part of the value that is only possible: with it the limit may be not shown to be kept, but is never broken."""
+        """Part of the value that is only possible: it can leave the limit not shown, but not break it."""
         return 0.0
 
     def advice(self, network: Network) -> str:
