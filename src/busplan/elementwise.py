@@ -8,10 +8,11 @@ arrays are.
 import operator
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import wraps
 from itertools import repeat
 from math import ceil, floor, inf, isinf, sqrt
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, ParamSpec, TypeAlias
 
 from busplan.sourced import Input, Sourced, constants_looked_up, input_of, short
 
@@ -479,6 +480,24 @@ def named(number: Number, key: str, symbol: str, reference: str = "") -> Number:
     With `reference`, the source of this number, where it is not that of the figure with this key.
     """
     return number.named(key, symbol, reference) if isinstance(number, Traced) else number
+
+
+_Parameters = ParamSpec("_Parameters")
+
+
+def step(symbol: str, key: str = "") -> Callable[[Callable[_Parameters, Number]], Callable[_Parameters, Number]]:
+    """Decorator of a function whose result is a step of a derivation: its key is the function's name, or given."""
+
+    def of_function(function: Callable[_Parameters, Number]) -> Callable[_Parameters, Number]:
+        key_or_name = key or function.__name__.lstrip("_")
+
+        @wraps(function)
+        def with_name(*given: _Parameters.args, **by_name: _Parameters.kwargs) -> Number:
+            return named(function(*given, **by_name), key_or_name, symbol)
+
+        return with_name
+
+    return of_function
 
 
 def worded(number: Number, words: str) -> Number:

@@ -37,6 +37,7 @@ from busplan.elementwise import (
     rounded_up,
     smaller,
     square_root,
+    step,
     total,
 )
 from busplan.errors import BusplanError
@@ -499,9 +500,10 @@ def frames(network: Network, present: Sequence[Devices]) -> tuple[FrameRun, ...]
     return tuple(frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes))
 
 
+@step("sending", "sending_us")
 def process_us(network: Network, present: Sequence[Devices]) -> Number:
     """Time of the frames of process data of some devices on the wire [us]."""
-    return named(sending_us(packing(network, present).wire_bytes), "sending_us", "sending")
+    return sending_us(packing(network, present).wire_bytes)
 
 
 def mailbox_frame_us(network: Network) -> Number:

@@ -23,7 +23,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import CycleWithStarts
 from busplan.buses.ieee1394.timing import IdleTime, Phases, Responder, idle_time, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, is_off, larger, named, total
+from busplan.elementwise import Number, is_off, larger, step, total
 from busplan.sections.base import TransactionKind
 
 
@@ -62,11 +62,11 @@ class BroadcastCycle(CycleWithStarts):
     """
 
     @cached_property
+    @step("T_query")
     def query_us(self) -> Number:
         """The query with its acknowledge [us]."""
         data_us = self.delays.data_us(c.QUADLET_WRITE_REQUEST_BYTES)
-        query_us = self.delays.arbitration_us + data_us + self.delays.acknowledge_us
-        return named(query_us, "query_us", "T_query")
+        return self.delays.arbitration_us + data_us + self.delays.acknowledge_us
 
     @property
     def _is_isochronous(self) -> bool:
@@ -135,11 +135,12 @@ class BroadcastCycle(CycleWithStarts):
         return self.first_wait_us + self.network.nodes * self.gap_us + self.slot_waits_us
 
     @cached_property
+    @step("T_boards")
     def boards_us(self) -> Number:
         """All broadcasts with their gaps [us]."""
         each_us = self.gap_us + self.arbitration_us
         sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
-        return named(self.first_wait_us + sent_us + self.slot_waits_us, "boards_us", "T_boards")
+        return self.first_wait_us + sent_us + self.slot_waits_us
 
     @cached_property
     def hub(self) -> Phases:
@@ -157,10 +158,11 @@ class BroadcastCycle(CycleWithStarts):
         return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
 
     @cached_property
+    @step("late")
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
         wait_us = c.HUB_WAIT_US + c.HUB_WAIT_PER_NODE_US * self.network.nodes
-        return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
+        return larger(wait_us - self.boards_us, 0.0)
 
     @cached_property
     def hub_wait(self) -> IdleTime:
@@ -274,9 +276,10 @@ class BroadcastCycle(CycleWithStarts):
         )
 
     @property
+    @step("halves")
     def halves(self) -> Number:
         """Packets: the query, each broadcast, two of the hub, the write, and retries [1]."""
-        return named(self.network.nodes + 4 + self.network.profile.cycle.retries, "halves", "halves")
+        return self.network.nodes + 4 + self.network.profile.cycle.retries
 
     @property
     def with_gap(self) -> Number:

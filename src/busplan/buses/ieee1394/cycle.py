@@ -29,7 +29,7 @@ from busplan.buses.ieee1394.transactions import (
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, is_off, larger, named, rounded_down, smaller, total
+from busplan.elementwise import Number, is_off, larger, named, rounded_down, smaller, step, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 _PHASES: Final = by_key(LATENCY)
@@ -176,14 +176,16 @@ class CycleWithStarts(BusCycle):
         """All reads T_r or all writes T_w of a cycle, with their gaps [us]."""
 
     @cached_property
+    @step(READS.symbol)
     def reads_us(self) -> Number:
         """T_r [us]."""
-        return named(self.all_us("read"), READS.key, READS.symbol)
+        return self.all_us("read")
 
     @cached_property
+    @step(WRITES.symbol)
     def writes_us(self) -> Number:
         """T_w [us]."""
-        return named(self.all_us("write"), WRITES.key, WRITES.symbol)
+        return self.all_us("write")
 
     @property
     def required_time_slice_us(self) -> Number:
@@ -228,7 +230,7 @@ class CycleWithStarts(BusCycle):
             "hops": self.link.hops,
             "gap_count": self.link.gap_count,
             "safe_gap_count": safe,
-            "gap_count_safe": self.link.gap_count >= named(safe, "safe_gap_count", "g_safe"),
+            "gap_count_safe": self.link.gap_count >= safe,
             "read_latency_us": read.latency_us,
             "write_latency_us": write.latency_us,
             "read_latency_with_gaps_us": read.latency_with_gaps_us,

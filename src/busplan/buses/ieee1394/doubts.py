@@ -21,7 +21,7 @@ from busplan.buses.ieee1394.timing import (
 from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Exchange
 from busplan.buses.network import Network
 from busplan.buses.published import Spread, rows_of
-from busplan.elementwise import Number, choose, is_off, larger, named, total
+from busplan.elementwise import Number, choose, is_off, larger, named, step, total
 from busplan.sourced import Sourced, cached
 
 _RECTANGULAR: Final = sqrt(3)
@@ -248,11 +248,12 @@ def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ..
     return tuple((node, named(total(halves), "split_halves", "halves")) for node, halves in counts.values())
 
 
+@step("halves_other")
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
     """Halves of all other transactions in the cycle, and retries [1]."""
     unsplit = [exchange for exchange in exchanges if exchange.responder.answer != "split"]
     halves = total(exchange.group.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
-    return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
+    return halves + network.profile.cycle.retries
 
 
 def _is_fitted(node: Any) -> Number:

@@ -15,7 +15,7 @@ Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 42
 """
 
 from busplan.buses.ieee1394.constants import BITS_PER_BYTE, c
-from busplan.elementwise import Number
+from busplan.elementwise import Number, step
 from busplan.sourced import SYMBOLS, published
 
 SYMBOLS.update(
@@ -90,6 +90,7 @@ def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
     section="III-E",
     part="their bracket, for a cable of 4.5 m; in proportion to the length for others",
 )
+@step("hop", "hop_us")
 def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
     """Delay of a hop, cable and PHY.
 
@@ -188,6 +189,7 @@ def acknowledge_us(acknowledge_phase_us: Number) -> Number:
 
 
 @published(10, symbol="T_sub", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
+@step("T_sub")
 def subaction_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Subaction gap.
 
@@ -202,6 +204,7 @@ def subaction_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
 
 
 @published(10, symbol="T_reset", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
+@step("T_reset")
 def arbitration_reset_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Arbitration reset gap.
 
@@ -216,6 +219,7 @@ def arbitration_reset_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> 
 
 
 @published(10, symbol="T_sum", section="III-E")
+@step("T_sum")
 def gaps_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Subaction gap and arbitration reset gap together.
 

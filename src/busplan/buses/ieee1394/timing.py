@@ -120,21 +120,18 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
     rate_mbit_s, gap_count = link.data_rate_mbit_s, link.gap_count
     if not link.has_gaps:
         beta_phy_us = c.BETA_PHY_DELAY_US if link.phy_delay_us is None else link.phy_delay_us
-        hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us), "hop_us", "hop")
+        hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us)
         # The next packet need not wait until all nodes have one: only the way to a node and back is surely waited for.
         return Delays(link, rate_mbit_s, Gaps(0.0, 0.0, 0.0, alone), hop_us, 0.0, 0.0, 0).over(0)
     clock_mbit_s = rate_mbit_s if model == "paper" else c.BASE_RATE_MBIT_S
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
-    subaction_us = equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
-    reset_us = equations.arbitration_reset_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
-    both_us = equations.gaps_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
     gaps = Gaps(
-        named(subaction_us, "subaction_gap_us", "T_sub"),
-        named(reset_us, "arbitration_reset_gap_us", "T_reset"),
-        named(both_us, "gaps_us", "T_sum"),
+        equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s),
+        equations.arbitration_reset_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s),
+        equations.gaps_us(gap_count, gap_clock_mbit_s=clock_mbit_s),
         alone,
     )
-    hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+    hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us)
     return Delays(link, clock_mbit_s, gaps, hop_us, 0.0, 0.0, 0).over(link.hops)
 
 

@@ -161,7 +161,7 @@ def formula_of(equation: Equation) -> str:
     first, *rest = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
     with constants_looked_up(TracedConstant):
         result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
-    return result.symbol or formula_text(result, in_numbers=False)
+    return result.symbol if result is first else formula_text(result, in_numbers=False)
 
 
 def lines(figure: Traced) -> Iterator[Traced]:
