@@ -108,6 +108,7 @@ def test_a_worker_that_is_killed_loses_nothing(
             stderr=standard_error,
         ) as process,
     ):
+        client.wait_for_workers(len(cluster.workers))
         ((first, _),) = ((at, pid) for at, pid in client.run(os.getpid).items() if pid == cluster.workers[0])
         # It has results that nobody else has, and is at more.
         assert until(lambda: client.has_what()[first] and client.processing()[first])
