@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from busplan.english import printable
 from busplan.errors import BusplanError
-from busplan.files import is_unwritten_pipe
+from busplan.files import require_regular
 from busplan.progress import Progress
 from busplan.recordings.written import SYNTHETIC
 
@@ -105,8 +105,7 @@ def packets(path: Path, notes: CaptureNotes, *, link: int = ETHERNET, progress: 
     BusplanError
         The file cannot be read, or is no such file.
     """
-    if is_unwritten_pipe(path):
-        raise BusplanError(f"{path}: is a named pipe; give a regular file")
+    require_regular(path, or_written_pipe=True)
     try:
         with path.open("rb") as file:
             yield from _pieces(file, path, notes, link, progress)
