@@ -146,6 +146,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
     name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
     try:
         with path.open("rb") as file:
+            reader: Any
             if name is None:
                 reader = can.CanutilsLogReader(cast("Any", _CandumpText(path, file)))
             elif name == "BLFReader":

@@ -79,6 +79,12 @@ class CaptureNotes:
     """What its comment, or its frames, say of an emulation; empty where it is of a machine."""
     broken_at: int | None = None
     """Offset of the damage in the file, from which nothing is read; None for a whole file."""
+    is_long: bool = False
+    """Whether the file has more packets than are read; `broken_at` is where the next begins."""
+
+
+MOST_PACKETS: Final = 2_000_000
+"""Most packets of a capture that are read, but for the rest of a piece: they bound the memory."""
 
 
 def is_capture(head: bytes) -> bool:
@@ -142,6 +148,9 @@ def _pieces(
                 return
             before = int(times[-1])
         at += used
+        if notes.packets >= MOST_PACKETS:
+            notes.broken_at, notes.is_long = at, True
+            return
         is_last = len(content) - len(held) < _PIECE_BYTES
         held = content[used:]
         progress(min(at, total), total)
