@@ -56,52 +56,35 @@ _UNITS: Final = {
 
 
 class Figure(NamedTuple):
-    """One key of a command's JSON.
-
-    Parameters
-    ----------
-    key
-        Name in JSON, CSV and the results.
-    symbol
-        Its symbol in a derivation.
-    reference
-        Numbers of its equations, or where else it comes from.
-    meaning
-        What it is, in one line.
-    label
-        Its name in tables; a figure without it is in no table of a command.
-    column
-        Text of a table's unit column, where that is not the unit: "%" for a share.
-    sort
-        What its values are.
-    decimals
-        Decimals of a plain number in tables; None for as many as it has.
-    better
-        Which direction is better.
-    scale
-        Key of the figure that its rounding error is relative to; for a difference of two large figures.
-    relative
-        Whether a relative change of it means anything.
-    ink, letter
-        Its colour and letter in drawings, where it is a part of the slice.
-    is_hexadecimal
-        Whether tables write it as 0x1f.
-    """
+    """One key of a command's JSON."""
 
     key: str
+    """Name in JSON, CSV and the results."""
     symbol: str
+    """Its symbol in a derivation."""
     reference: str
+    """Numbers of its equations, or where else it comes from."""
     meaning: str
+    """What it is, in one line."""
     label: str = ""
+    """Its name in tables; a figure without it is in no table of a command."""
     column: str = ""
+    """Text of a table's unit column, where that is not the unit: "%" for a share."""
     sort: Sort = "number"
+    """What its values are."""
     decimals: int | None = 3
+    """Decimals of a plain number in tables; None for as many as it has."""
     better: Better = "neither"
+    """Which direction is better."""
     scale: str | None = None
+    """Key of the figure that its rounding error is relative to; for a difference of two large figures."""
     relative: bool = True
+    """Whether a relative change of it means anything."""
     ink: Ink = "idle"
     letter: str = ""
+    """Its colour and letter in drawings, where it is a part of the slice."""
     is_hexadecimal: bool = False
+    """Whether tables write it as 0x1f."""
 
     @property
     def unit(self) -> str:

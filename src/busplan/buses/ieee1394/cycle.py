@@ -62,7 +62,7 @@ STRETCHES: Final = (
     EventKind("read", "reads", "", "R", "in"),
     EventKind("write", "writes", "", "W", "out"),
 )
-"""Rows of the drawing that several events make up together."""
+"""Kinds of stretches, each a sequence of events."""
 
 
 PREMISES: Final = (
@@ -213,7 +213,7 @@ class CycleWithStarts(BusCycle):
         return 0.0 if is_split else super().taking_us(group)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """Periods of a node's loop: 1, or more where a command is not executed by the next synchronous packet."""
+        """Periods inside a loop [1]: 1, or more where a node has not executed its command by the next synchronous packet."""
         if not at_sync:
             return 0
         behind_us = max(self.taking_us(group) for group in self.network.groups)
