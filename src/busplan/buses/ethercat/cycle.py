@@ -385,5 +385,5 @@ def _period_us(group: Group, network: Network) -> Number:
 
 
 def _until_taken(ready: Number) -> Number:
-    """Periods from a cycle's task to the frame that takes its sample, ready after `ready` periods: at least the next."""
+    """Periods from a cycle's task to the frame that takes its sample, ready after `ready` of them; 1 or more."""
     return larger(rounded_up(ready), 1)

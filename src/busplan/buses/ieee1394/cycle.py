@@ -213,7 +213,11 @@ class CycleWithStarts(BusCycle):
         return 0.0 if is_split else super().taking_us(group)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """Periods inside a loop [1]: 1, or more where a node has not executed its command by the next synchronous packet."""
+        """Periods inside a loop [1].
+
+        With `at_sync` 1, or more where a node has not executed its command when the next synchronous packet comes; else
+        0, as commands take effect on arrival.
+        """
         if not at_sync:
             return 0
         behind_us = max(self.taking_us(group) for group in self.network.groups)
