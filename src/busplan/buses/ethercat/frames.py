@@ -52,7 +52,7 @@ class Devices(NamedTuple):
     data_bytes: Number
     """Process data of each device [bytes]."""
     starts: Starts | None = None
-    """Frame or datagram that begins with these devices and has no data of devices before them."""
+    """Datagram or frame that the devices open; None where their data follow in the datagram before."""
 
 
 class Packing(NamedTuple):
@@ -400,7 +400,7 @@ def _all_devices(network: Network) -> tuple[Devices, ...]:
 
 
 def _starts(group: Group) -> Starts | None:
-    """Frame or datagram that begins with a group; None for the devices of [node]."""
+    """Datagram or frame that a group opens; None where it follows in the datagram before, and for [node]."""
     starts: Starts | None = getattr(group.node, "starts", None)
     return starts
 

@@ -29,7 +29,7 @@ class LineDelays(NamedTuple):
     latches: int
     """Number of broadcast writes that the delays are a mean over [1]."""
     remarks: tuple[str, ...]
-    """Reasons why the port receive times do not show some delays."""
+    """Sentences on delays that the port receive times do not show, and why."""
 
     def figures(self, network: Network) -> Iterator[RecordedFigure]:
         """Recorded delay of each device, and mean of each group of the plan.

@@ -160,7 +160,7 @@ class Ieee1394Payload(PayloadSection):
 
 
 class FittedExecution(Section):
-    """What an execution time that was fitted against a timing model holds of that model's error."""
+    """Keys of an execution time that was fitted against a timing model, and so contains that model's error."""
 
     residual: Literal["none", "paper", "standard"] = Field(
         default="none",

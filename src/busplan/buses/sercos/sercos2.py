@@ -184,7 +184,7 @@ class Sercos2Cycle(SercosCycle):
 
     @property
     def feedback_due_us(self) -> Number:
-        """Time from the start of a cycle to its feedback: 0, since feedback is sampled when MST begins [us]."""
+        """Time by which feedback must be ready [us]: 0, the start of MST."""
         return 0.0
 
     def latencies(self) -> tuple[BusLatency, ...]:
