@@ -31,13 +31,7 @@ def kind_names() -> tuple[str, ...]:
 
 
 def kind_named(name: str) -> "Bus":
-    """The kind of bus with a name.
-
-    Raises
-    ------
-    KeyError
-        There is no kind of that name.
-    """
+    """Kind of bus by name; another name raises KeyError."""
     if name not in _LOADED:
         bus: Bus = import_module(_MODULES[name]).BUS
         _LOADED[name] = bus
@@ -47,17 +41,8 @@ def kind_named(name: str) -> "Bus":
 def kind_called(word: str, *, option: str = "") -> str:
     """Name of the kind that a user's word means: a kind's name, its title, or another name that it declares.
 
-    Parameters
-    ----------
-    word
-        The word as typed; case, spaces and punctuation do not count.
-    option
-        The command-line option with the word, for the message.
-
-    Raises
-    ------
-    BusplanError
-        The word means no kind.
+    Case, spaces and punctuation do not count. A word that means no kind raises `BusplanError`, whose message names the
+    command-line `option` that had it.
 
     Examples
     --------
@@ -98,13 +83,7 @@ def _plain(name: str) -> str:
 
 @contextmanager
 def registered(bus: "Bus") -> Iterator[None]:
-    """Register a further kind for a while, for a test.
-
-    Raises
-    ------
-    ValueError
-        There is a kind of that name.
-    """
+    """Context in which a further kind is registered, for a test; a name that is taken raises ValueError."""
     if bus.kind in _MODULES:
         raise ValueError(f"there is a kind of bus called {bus.kind}")
     _MODULES[bus.kind] = type(bus).__module__

@@ -1,8 +1,8 @@
-"""Interface of a kind of bus: all that an analysis may ask of it.
+"""Interface of a kind of bus: all questions that an analysis may ask of it.
 
 An analysis calls these methods and never reads a kind's own keys. Cycles, figures and limits use operators and the
-functions of `busplan.elementwise`: so they take floats, arrays and traced numbers, and branch on strings only. What is
-"of plain numbers" takes floats alone.
+functions of `busplan.elementwise`, so they take floats, arrays and traced numbers; they branch on strings only. A
+function "in plain numbers" takes floats alone.
 """
 
 from abc import ABC, abstractmethod
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 class Bus(ABC):
-    """A kind of bus: no state, only answers."""
+    """A kind of bus; it has no state."""
 
     kind: ClassVar[str]
     title: ClassVar[str]
@@ -57,30 +57,30 @@ class Bus(ABC):
     limits: ClassVar[tuple[Limit, ...]]
     """Limits in the order of reports; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
-    """Periods that it allows; a kind with a list has a `period_limit` and a rule on `unknown_period`."""
+    """Periods that the bus allows; a kind with a list has a `period_limit` and a rule on `unknown_period`."""
     starter: ClassVar[Starter]
     """Defaults of a new profile."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
-    """Kinds of event in the order of the cycle."""
+    """Kinds of events in the order of the cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
-    """Kinds of a sequence of events, such as a transaction or a frame."""
+    """Kinds of stretches, each a sequence of events, such as a transaction or a frame."""
     rate_keys: ClassVar[tuple[str, ...]] = ()
     """Bit rates that a profile gives [kbit/s]: all times on the wire follow from them."""
     constants: ClassVar[Constants] = Constants()
-    """Its constants, each with its source, by name."""
+    """Constants of the kind, each with its source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}
     """Facts about the kind's own keys, by dotted key; those of [[group]] stand under `node.` or `payload.`."""
     calibration: ClassVar[MeasuredLatencies | None] = None
     """Calibration of execution times from measured latencies; None where latencies do not show them."""
     recordings: ClassVar[str] = ""
-    """Recordings that it compares with a plan, for messages; empty if it reads none."""
+    """Recordings that the kind compares with a plan, for messages; empty if it reads none."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """Changes that each take a term out of the cycle: new values by dotted key."""
     modules: ClassVar[tuple[str, ...]] = ()
-    """Modules beside its own that a single command imports: `evidence` with `FUNCTIONS`, `emulated` with `EMULATOR`."""
+    """Further modules, each imported by one command: `evidence` with `FUNCTIONS`, `emulated` with `EMULATOR`."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
-    """Data files, in busplan/data, with figures of it that others have published or measured."""
+    """Data files in busplan/data with figures of the kind that others have published or measured."""
 
     @property
     def deciding_model(self) -> str:
@@ -95,18 +95,18 @@ class Bus(ABC):
 
     @abstractmethod
     def cycle(self, network: Network, *, model: str) -> BusCycle:
-        """The cycle of a network under a timing model."""
+        """Cycle of a network under a timing model."""
 
     def latency_subject(self, network: Network) -> str:
-        """Say what the latencies are of, and the settings in force."""
+        """Words for the way that the latencies cover, and for the settings in force."""
         return ", ".join(("the whole cycle", *self.setup_words(network)))
 
     def evidence_for(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - most are tested as a whole
-        """The data files whose figures test such a network."""
+        """Data files whose figures test such a network."""
         return self.evidence_data
 
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:  # noqa: ARG002 - most can
-        """Keys in the profile that a timing model has no term for; with any, the model does not apply."""
+        """Keys in the profile for which a timing model has no term; with any, the model does not apply."""
         return ()
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - most have
@@ -136,11 +136,11 @@ class Bus(ABC):
         return fastest.payload_key("every"), int(fastest.every)
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
-        """Say how large a network is, in plain numbers: each number with its noun."""
+        """Size of a network in plain numbers, each with its noun."""
         return (int(network.nodes), "node"), (int(network.axes), "axis")
 
     def path_words(self, network: Network) -> str:  # noqa: ARG002 - a kind may have a single way
-        """Say which distance on the wire each node is charged with, where the kind has a choice."""
+        """Words for the distance on the wire that each node is charged with, where the kind has a choice."""
         return ""
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
@@ -156,7 +156,7 @@ class Bus(ABC):
         return self._of("evidence", "FUNCTIONS") or {}
 
     def title_of(self, network: Network) -> str:  # noqa: ARG002 - of every network the same, unless a kind has several
-        """Name of the bus of a network, for people."""
+        """Name of the network's bus, for people."""
         return self.title
 
     def recorded(
@@ -168,49 +168,35 @@ class Bus(ABC):
         channel: str | None,  # noqa: ARG002
         progress: Progress,  # noqa: ARG002
     ) -> Recorded:
-        """Compare a recording of the machine with the plan.
+        """Comparison of a recording of the machine with the plan.
 
-        Parameters
-        ----------
-        network
-            The plan, of plain numbers.
-        path
-            The recording.
-        share
-            Quantile of the events for worst cases, 0.5..1.
-        channel
-            Of a recording of several channels, the name of the one that is compared.
-        progress
-            Called with the bytes read and the size of the file [bytes].
-
-        Raises
-        ------
-        BusplanError
-            The file is no recording of the kind, or no recording of the kind is read.
+        `network` has plain numbers. `share` is the quantile of the events for worst cases, 0.5..1. `channel` names the
+        one that is compared, in a recording of several. `progress` is called with the bytes read and the size of the
+        file [bytes]. Raises `BusplanError` where the file is no recording of the kind, or the kind reads none.
         """
         latencies = "; latencies in a CSV file are for busplan calibrate" if self.calibration else ""
         raise BusplanError(f"{path}: no recording of bus.kind {self.kind} is read{latencies}")
 
     def emulator(self) -> Emulator | None:
-        """What it emulates; None if it writes no recordings."""
+        """Emulator of the kind; None if it writes no recordings."""
         emulator: Emulator | None = self._of("emulated", "EMULATOR")
         return emulator
 
     def _of(self, module: str, name: str) -> Any:
-        """What a module beside its own has by a name, imported only here; None where it has no such module."""
+        """Object of a further module by name, imported only here; None where the kind has no such module."""
         package = type(self).__module__.removesuffix("kind")
         return getattr(import_module(f"{package}{module}"), name) if module in self.modules else None
 
     def limit(self, key: str) -> Limit | None:
-        """The limit of a key; None for time, which is no limit of the bus."""
+        """Limit by its key; None for time, which is no limit of the bus."""
         return next((limit for limit in self.limits if limit.key == key), None)
 
     def broken(self, network: Network) -> tuple[Limit, ...]:
-        """The limits that a network breaks, safety limits left out; of plain numbers."""
+        """Limits that a network breaks, safety limits left out, in plain numbers."""
         return tuple(limit for limit in self.limits if limit.role != "safety" and limit.is_broken(network))
 
     def is_safe(self, network: Network) -> bool:
-        """Whether a network keeps every safety limit; of plain numbers."""
+        """Whether a network keeps every safety limit, in plain numbers."""
         return not any(limit.is_broken(network) for limit in self.limits if limit.role == "safety")
 
     def event_kind(self, key: str) -> EventKind:

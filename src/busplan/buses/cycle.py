@@ -1,4 +1,4 @@
-"""A cycle of any bus: events in the order of the wire, from which terms and the timeline come.
+"""A cycle of any bus: events in the order of the wire, from which terms and timeline follow.
 
 Each kind writes its cycle once, as runs: a run is a sequence of events, repeated for some rounds. Terms are sums over
 runs and multiply by the rounds, so a million nodes cost no more than one. The timeline lays out every event of a run.
@@ -21,13 +21,13 @@ BUT_FIRST: Final[Rounds] = "but first"
 
 
 class Term(NamedTuple):
-    """A part of the cycle. All terms add up to what the cycle needs."""
+    """A part of the cycle; all terms add up to the time that the cycle needs."""
 
     key: str
-    """Key of its figure."""
+    """Key of the term's figure."""
     us: Number
     rests_on: str = ""
-    """Dotted key of the profile that it comes from; empty unless it is a single key."""
+    """Dotted key of the profile that alone sets the term; empty where several do, or none."""
 
     @property
     def name(self) -> str:
@@ -36,27 +36,28 @@ class Term(NamedTuple):
 
 
 class BusEvent(NamedTuple):
-    """A stretch of the cycle; it begins where the one before it ends. The events of a term add up to it."""
+    """A stretch of the cycle that begins where the event before it ends; the events of a term add up to it."""
 
     kind: str
     """Key of its `EventKind`."""
     term: str
-    """Key of the term that it is a part of."""
+    """Key of the term that the event is a part of."""
     us: Number
-    """Duration [us]: a float once it is laid out; in a run it may be an array or a traced number."""
+    """Duration [us]: a float once the event is laid out; in a run also an array or a traced number."""
     label: str
     """Name of the event, with the node or device that causes it."""
     node: int | None = None
     """Node number, from 1, where the cycle is laid out; None for an event of the whole bus."""
     transaction: str | None = None
     """Key of the `EventKind` of the transaction or frame that the event is a part of. In a run of a group, an event
-    without it belongs to no node."""
+    without it belongs to no node.
+    """
     packet: str | None = None
     """Packet of the transaction that the event belongs to."""
     rests_on: str = ""
-    """Dotted key of the profile that it comes from; empty unless it is a single key."""
+    """Dotted key of the profile that alone sets the event; empty where several do, or none."""
     rounds: Rounds = ALL
-    """Rounds of its run in which it happens."""
+    """Rounds of the run that have the event."""
 
 
 class Run(NamedTuple):
@@ -69,17 +70,18 @@ class Run(NamedTuple):
     group: int | None = None
     """Index of the group whose nodes take turns, each for the same number of rounds; None for the whole bus."""
     laid_out: Callable[[Number], Iterable[BusEvent]] | None = None
-    """Gives the events of a round by its number, from 0: in more detail for a timeline, or for rounds that differ.
+    """Events of a round, by its number from 0: in more detail for a timeline, or for rounds that differ.
 
-    Summed over all rounds they equal `events`. Where rounds differ, it must also take a mean number, such as 1.5.
+    Summed over all rounds they equal `events`. Where rounds differ, the function must also take a mean number, such as
+    1.5.
     """
 
     def events_us(self) -> Iterator[tuple[str, Number]]:
-        """Term and duration of each event of a single round, without events of no duration [us]."""
+        """Term and duration of each event of a single round [us], without events of no duration."""
         return ((event.term, event.us) for event in self.events if not is_off(event.us))
 
     def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
-        """Term and duration of all rounds together, one sum for the events with the same term and `rounds` [us]."""
+        """Term and duration of all rounds together [us], one sum for the events with the same term and `rounds`."""
         parts: dict[tuple[str, Rounds], list[Number]] = {}
         for event in self.events:
             if not is_off(event.us):
@@ -87,7 +89,7 @@ class Run(NamedTuple):
         for (term, rounds), parts_us in parts.items():
             first_us = parts_us[0]
             are_equal = len(parts_us) > 1 and all(us is first_us for us in parts_us)
-            round_us = len(parts_us) * first_us if are_equal else total(parts_us)  # a product is a shorter derivation
+            round_us = len(parts_us) * first_us if are_equal else total(parts_us)  # A product is a shorter derivation.
             if rounds != FIRST:
                 round_us = (times if rounds == ALL else times - 1) * round_us
             yield term, round_us
@@ -96,12 +98,7 @@ class Run(NamedTuple):
 def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
     """Time of each term: the sum of its events in the order of the runs, 0.0 for a term without events [us].
 
-    Parameters
-    ----------
-    runs
-        The runs; an event whose term is not in `keys` raises a KeyError.
-    keys
-        Keys of the terms, in their order.
+    An event whose term is not in `keys` raises KeyError.
     """
     sums: dict[str, Number | None] = dict.fromkeys(keys)
     for run in runs:
@@ -122,16 +119,16 @@ class Doubt(NamedTuple):
 
 
 class RestsOn(NamedTuple):
-    """What a verdict takes for granted because the profile does not give it."""
+    """An assumption of a verdict about something that the profile does not give."""
 
     key: str
     """Dotted key that would give it; empty where no key does."""
     words: str
-    """What is taken instead, in a few words."""
+    """The assumption in a few words."""
 
 
 class Premise(NamedTuple):
-    """A row of a kind's table of what is taken for granted while the profile does not give it."""
+    """A row of a kind's table of assumptions, made while the profile does not give the key."""
 
     key: str
     """Dotted key, with "node" for each group; empty where no key gives it."""
@@ -139,7 +136,7 @@ class Premise(NamedTuple):
     usual: object = None
     """A value that a machine usually has, valid in a new profile."""
     applies: Callable[[Any], bool] = lambda cycle: True  # noqa: ARG005 - of every cycle
-    """Whether it plays a part in a cycle of plain numbers."""
+    """Whether the assumption matters in a cycle of plain numbers."""
 
 
 SHARED_PREMISES: Final = (
@@ -157,44 +154,45 @@ class BusLatency(NamedTuple):
     phases: Mapping[str, Number]
     """Figures by key, of the kind's `figures.latency_table`; infinite where the phase does not exist."""
     group: str = ""
-    """Name of its group of nodes; empty where all nodes are alike."""
+    """Name of the group; empty where all nodes are alike."""
 
     @property
     def label(self) -> str:
-        """Name with that of its group."""
+        """Name of the latency, with that of its group."""
         return f"{self.group} {self.name}" if self.group else self.name
 
 
 class BusCycle(ABC):
     """One communication cycle of a network under a timing model.
 
-    The time that it needs does not depend on the period or the slice ratio, which say what it is given. So the smallest
-    period and ratio follow from it.
+    The time that it needs does not depend on the period or the slice ratio, which set the time that it is given. So the
+    smallest period and ratio follow from it.
     """
 
     network: Network
     number: int | None = None
-    """Which cycle of the hyperperiod (the common multiple of the rates) it is, from 1; None for that of the verdict."""
+    """Cycle of the hyperperiod (the common multiple of the rates), from 1; None for the cycle of the verdict."""
     term_figures: ClassVar[tuple[Figure, ...]]
-    """One for each term, in their order."""
+    """Figures of the terms, in their order."""
     premises: ClassVar[tuple[Premise, ...]] = ()
-    """Table of the kind: what is taken for granted while a profile does not give it, what matters most first."""
+    """Assumptions of the kind while a profile does not give a key, the most important first."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
     """Transaction and kind of the events that bring a node its command, complete at the end of the last; empty if it is
-    complete at the end of the cycle. Events without a node bring the command of all."""
+    complete at the end of the cycle. Events without a node bring the command of all.
+    """
 
     @property
     def rates(self) -> tuple[Rate, ...]:
-        """The rate of each group: in which cycles its data are sent; of plain numbers."""
+        """Rate of each group, which sets the cycles that carry its data, in plain numbers."""
         return tuple(Rate(1) for _ in self.network.groups)
 
     @property
     def fullest(self) -> int:
-        """The first cycle of the hyperperiod in which most is sent, from 1; of plain numbers."""
+        """First cycle of the hyperperiod in which most is sent, from 1, in plain numbers."""
         return 1
 
     def at(self, number: int) -> "BusCycle":  # noqa: ARG002 - most kinds have a single rate
-        """The cycle with a number, from 1; of plain numbers."""
+        """Cycle `number` of the hyperperiod, from 1, in plain numbers."""
         return self
 
     @abstractmethod
@@ -208,7 +206,7 @@ class BusCycle(ABC):
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
-        """Time of each term, by its key in the order of the terms [us]."""
+        """Time of each term by its key, in the order of the terms [us]."""
         return summed(self.runs, (figure.key for figure in self.term_figures))
 
     @cached_property
@@ -232,31 +230,26 @@ class BusCycle(ABC):
 
     @property
     def most_required_us(self) -> Number:
-        """Upper bound over all smaller node counts, where one node more can make a cycle shorter [us]."""
+        """Upper bound of `required_us` over all smaller node counts [us]: one more node can shorten a cycle."""
         return self.required_us
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
-        """Growth of the whole cycle if its transmissions take longer [us].
+        """Growth of the whole cycle when its transmissions take longer [us].
 
-        Parameters
-        ----------
-        extra_us
-            By how much it takes longer [us].
-        after_us
-            By how much it took longer before [us].
+        The growth `extra_us` of the transmissions comes on top of `after_us`, by which they already take longer.
         """
         return extra_us
 
     def bias_us(self) -> Number | None:
-        """Mean time that the bus takes in addition to the timing model [us]; None where it is unknown."""
+        """Mean time that the bus takes beyond the timing model [us]; None where it is unknown."""
         return None
 
     def possible_us(self) -> Number:
-        """Part of the cycle that is only possible: without it, a cycle that fits is not shown not to fit [us]."""
+        """Part of the cycle that is only possible [us]: a cycle that fits without it may fit."""
         return 0.0
 
     def sync_jitter_us(self) -> Number:
-        """Jitter of the synchronous packet due to the traffic of the cycle, +/- about its mean [us]."""
+        """Jitter of the synchronous packet from the traffic of the cycle, +/- about its mean [us]."""
         return 0.0
 
     def taking_us(self, group: Group) -> float:
@@ -264,31 +257,28 @@ class BusCycle(ABC):
         return group.write_execution_us + group.worst_extra_us
 
     def sampled_us(self) -> float:
-        """When nodes sample the feedback that a cycle carries, from its start; of plain numbers [us]."""
+        """Time from the start of a cycle at which nodes sample the feedback that it carries, in plain numbers [us]."""
         return 0.0
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
 
-        Parameters
-        ----------
-        at_sync
-            Whether commands take effect at the next synchronous point: the wait for it is counted. Otherwise they take
-            effect on arrival, and the caller adds that time.
+        With `at_sync`, commands take effect at the next synchronous point, and the wait for it counts. Otherwise they
+        take effect on arrival, and the caller adds that time.
         """
         return 1 if at_sync else 0
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """Inputs that are not known exactly; different ones are independent."""
+        """Doubts of inputs that are not known exactly; different inputs are independent."""
         return ()
 
     @property
     def executes(self) -> bool:
-        """Whether the time that a node takes plays a part in any figure."""
+        """Whether a node's execution time counts in any figure."""
         return True
 
     def rests_on(self) -> tuple[RestsOn, ...]:
-        """What the profile does not give and is taken for granted; what matters most first."""
+        """Assumptions about keys that the profile does not give, the most important first."""
         return tuple(
             RestsOn(key, premise.words)
             for premise in (*self.premises, *SHARED_PREMISES)
@@ -297,7 +287,7 @@ class BusCycle(ABC):
         )
 
     def _not_given(self, key: str) -> Iterator[str]:
-        """Dotted keys behind a key of the table that the profile does not give, of each group; not even as 0."""
+        """Dotted keys behind a key of the table that the profile does not give, for each group; 0 counts as given."""
         section, _, name = key.partition(".")
         if section == "node":
             yield from (group.key(name) for group in self.network.groups if not _is_given(group.node, name))
@@ -308,11 +298,11 @@ class BusCycle(ABC):
             yield key
 
     def events(self) -> Iterator[BusEvent]:
-        """All events of the cycle, one by one; of plain numbers."""
+        """All events of the cycle, one by one, in plain numbers."""
         return chain.from_iterable(self.each_round())
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
-        """The events of each round, which are never interrupted; of plain numbers."""
+        """Events of each round, which nothing interrupts, in plain numbers."""
         for run in self.runs:
             count = 1 if run.times is None else int(run.times)
             first, rounds = self._turns(run)
@@ -320,20 +310,14 @@ class BusCycle(ABC):
                 yield _round(run, number, None if run.group is None else first + number // rounds)
 
     def _turns(self, run: Run) -> tuple[int, int]:
-        """First node of a run, and the number of rounds of each node; of plain numbers."""
+        """First node of a run, and number of rounds of each node, in plain numbers."""
         if run.group is None:
             return 1, 1
         nodes = [int(group.nodes) for group in self.network.groups]
         return sum(nodes[: run.group]) + 1, int(run.times or 1) // nodes[run.group]
 
     def arrival_us(self, node: int) -> float:
-        """When a node has its command, from the start of a cycle of plain numbers [us].
-
-        Parameters
-        ----------
-        node
-            Number of the node, from 1.
-        """
+        """Time from the start of a cycle of plain numbers to the command of node `node`, which counts from 1 [us]."""
         arrived_us, now_us = None, 0.0
         for run in self.runs:
             first, rounds = self._turns(run)
@@ -348,12 +332,9 @@ class BusCycle(ABC):
         return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
 
     def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs follow each other at once
-        """Time of packets that the bus inserts between rounds, such as cycle starts of 1394; of plain numbers [us].
+        """Time of packets that the bus inserts between rounds, such as cycle starts of 1394, in plain numbers [us].
 
-        Parameters
-        ----------
-        sent_us
-            Time of the runs up to a round [us]: what was inserted before it counts.
+        `sent_us` is the time of the runs up to a round; packets inserted before that round count.
         """
         return 0.0
 
@@ -362,17 +343,14 @@ class BusCycle(ABC):
         return {}
 
     def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002 - not of all
-        """Lines of this kind in the summary card of `capacity`: labels and words; of plain numbers.
+        """Lines of this kind in the summary card of `capacity`, as labels and words, in plain numbers.
 
-        Parameters
-        ----------
-        fits
-            Whether a network is shown to fit, for lines that say how much more still does.
+        `fits` tells whether a network is shown to fit, for lines on how much more still fits.
         """
         return ()
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """The latencies; a kind without transactions has one, the cycle."""
+        """Latencies on the bus; a kind without transactions has one, the cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
         return (BusLatency("cycle", None, phases),)
 
@@ -386,7 +364,7 @@ def _is_given(section: Any, key: str) -> bool:
 
 
 def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
-    """The events of a round, of plain numbers."""
+    """Events of a round, in plain numbers."""
     for event in run.events if run.laid_out is None else run.laid_out(number):
         if event.rounds == ALL or (event.rounds == FIRST) == (number == 0):
             has_node = node is not None and event.transaction is not None
@@ -394,7 +372,7 @@ def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
 
 
 def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]) -> float | None:
-    """From the start of a round to the end of the last event of a command [us]; None without a command."""
+    """Time from the start of a round to the end of a command's last event [us]; None without a command."""
     if not any((event.transaction, event.kind) in commands for event in run.events):
         return None
     if len(run.events) == 1:
@@ -408,11 +386,13 @@ def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]
 
 
 def _rounds_us(run: Run, count: int) -> float:
-    """Time of the first `count` rounds of a run [us]: `count` times their mean; of plain numbers."""
+    """Time of the first `count` rounds of a run [us]: `count` times their mean, in plain numbers."""
     if not count:
         return 0.0
     events: Iterable[BusEvent] = run.events
-    if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ: the mean one
+    if (
+        run.laid_out is not None and run.group is not None and len(run.events) > 1
+    ):  # Rounds may differ, so the mean one.
         events = run.laid_out((count - 1) / 2)
     counts = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
     return sum(counts[event.rounds] * event.us for event in events)

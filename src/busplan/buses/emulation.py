@@ -1,4 +1,4 @@
-"""What a kind of bus is asked to emulate: a recording as the planned machine would give it, with named faults."""
+"""Emulation of a recording as the planned machine would give it, with named faults."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,14 +9,14 @@ from busplan.buses.network import Network
 from busplan.errors import BusplanError
 
 TIMES: Final = 5
-"""How often a fault happens, where nothing says otherwise."""
+"""Number of times that a fault happens by default."""
 LEAST_SHARE: Final = 0.5
-"""The host takes this share of its planned time, or more."""
+"""Least share of its planned time that the host takes."""
 MOST_FRAMES: Final = 500_000
 _FIRST: Final = 3
-"""Cycles before the first fault, which there may be the machine's start."""
+"""Cycles before the first fault, since a fault there may pass for the machine's start."""
 _ONE_OF: Final = 4
-"""A fault hits at most one of so many cycles."""
+"""Number of cycles of which a fault hits at most one."""
 
 
 class Fault(NamedTuple):
@@ -24,35 +24,32 @@ class Fault(NamedTuple):
 
     name: str
     words: str
-    """What the machine does."""
+    """Action of the machine, in words."""
     shown_as: str
-    """Figure of `measured` that shows it."""
+    """Figure of `measured` that shows the fault."""
     unit: Literal["1", "us"] = "1"
-    """Meaning of its value: how often it happens, or how late."""
+    """Unit of the value: a number of times, or a delay."""
     default: float = TIMES
-    """Value without one given; of a time, in periods."""
+    """Value by default; a time is in periods."""
 
 
 @dataclass
 class Emulation:
-    """How a machine is to be emulated."""
+    """Length, faults and random numbers of an emulation."""
 
     cycles: int
-    """Length of the recording; of messages alone in periods of the fastest."""
+    """Length of the recording in cycles; for messages alone, in periods of the fastest."""
     random: Random
     faults: Mapping[str, float]
     """Value of each fault, by name."""
     origin: str
-    """By what, and from what, in words."""
+    """Tool and source of the recording, in words."""
     _hit: set[int] = field(default_factory=set)
 
     def drawn(self, fault: Fault, among: Iterable[int]) -> frozenset[int]:
         """Cycles that a fault hits, except cycles of other faults; none unless it is asked for.
 
-        Raises
-        ------
-        BusplanError
-            More than a quarter of the cycles that it can happen in.
+        More than a quarter of the cycles that it can happen in raises `BusplanError`.
         """
         if fault.name not in self.faults:
             return frozenset()
@@ -66,24 +63,18 @@ class Emulation:
         return drawn
 
     def require_few(self, frames: float) -> None:
-        """Refuse a recording that is too large.
-
-        Raises
-        ------
-        BusplanError
-            More than `MOST_FRAMES`.
-        """
+        """Refuse a recording of more than `MOST_FRAMES` with a `BusplanError`."""
         if frames > MOST_FRAMES:
             raise BusplanError(f"{frames:,.0f} frames; a recording has up to {MOST_FRAMES:,}: give fewer cycles")
 
 
 class Emulator(NamedTuple):
-    """What a kind of bus emulates."""
+    """Emulation of a kind of bus."""
 
     faults: tuple[Fault, ...]
     endings: tuple[str, ...]
     """Endings that a file of its recordings may have."""
     period_us: Callable[[Network], float]
-    """Period of the cycle; of messages alone that of the fastest [us]."""
+    """Period of the cycle [us]; for messages alone, that of the fastest."""
     emulated: Callable[[Network, Emulation], bytes]
-    """The recording of a network of plain numbers."""
+    """Recording of a network of plain numbers."""

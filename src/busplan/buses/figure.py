@@ -1,4 +1,4 @@
-"""One figure of an answer: its key, its symbol, its unit, where it comes from, and what it is.
+"""One figure of an answer: its key, symbol, unit, source and meaning.
 
 Each figure is defined once: tables, JSON, sweeps, differences and derivations read it here. The figures of every bus
 are in this module; a kind of bus adds its own.
@@ -56,56 +56,38 @@ _UNITS: Final = {
 
 
 class Figure(NamedTuple):
-    """One key of a command's JSON.
-
-    Parameters
-    ----------
-    key
-        Name in JSON, CSV and the results.
-    symbol
-        Its symbol in a derivation.
-    reference
-        Numbers of its equations, or where else it comes from.
-    meaning
-        What it is, in one line.
-    label
-        Its name in tables; a figure without it is in no table of a command.
-    column
-        Text of a table's unit column, where that is not the unit: "%" for a share.
-    sort
-        What its values are.
-    decimals
-        Decimals of a plain number in tables; None for as many as it has.
-    better
-        Which direction is better.
-    scale
-        Key of the figure that its rounding error is relative to; for a difference of two large figures.
-    relative
-        Whether a relative change of it means anything.
-    ink, letter
-        Its colour and letter in drawings, where it is a part of the slice.
-    is_hexadecimal
-        Whether tables write it as 0x1f.
-    """
+    """One key of a command's JSON."""
 
     key: str
+    """Name in JSON, CSV and the results."""
     symbol: str
+    """Symbol in a derivation."""
     reference: str
+    """Numbers of the equations, or another source."""
     meaning: str
+    """Meaning in one line."""
     label: str = ""
+    """Name in tables; a figure without it is in no table of a command."""
     column: str = ""
+    """Text of a table's unit column, where that is not the unit: "%" for a share."""
     sort: Sort = "number"
     decimals: int | None = 3
+    """Decimals of a plain number in tables; None for as many as it has."""
     better: Better = "neither"
+    """Direction of improvement."""
     scale: str | None = None
+    """Key of the figure that the rounding error is relative to, for a difference of two large figures."""
     relative: bool = True
+    """Whether a relative change has a meaning."""
     ink: Ink = "idle"
     letter: str = ""
+    """Letter and `ink` in drawings, where the figure is a part of the slice."""
     is_hexadecimal: bool = False
+    """Whether tables write it as 0x1f."""
 
     @property
     def unit(self) -> str:
-        """Unit by the end of its name; empty for counts, shares and words."""
+        """Unit by the end of the key; empty for counts, shares and words."""
         return unit_of(self.key)
 
 
@@ -122,7 +104,7 @@ def unit_of(key: str) -> str:
 
 
 def by(*functions: Callable[..., object]) -> str:
-    """The numbers of the equations that some functions compute.
+    """Numbers of the equations that some functions compute.
 
     Examples
     --------
@@ -134,7 +116,7 @@ def by(*functions: Callable[..., object]) -> str:
 
 
 def by_key(figures: Iterable[Figure]) -> dict[str, Figure]:
-    """Some figures by their keys."""
+    """Figures by their keys."""
     return {figure.key: figure for figure in figures}
 
 
@@ -307,12 +289,7 @@ _OF_EVERY_BUS: Final = by_key(figure for figure in tuple(globals().values()) if 
 def read_figures(package: str) -> dict[str, tuple[Figure, ...]]:
     """Figures of a package's `figures.toml`, by group: a table of a group has the fields of a figure, by its key.
 
-    An empty table stands for the figure of every bus with that key; `decimals = "all"` for as many as a number has.
-
-    Parameters
-    ----------
-    package
-        The package.
+    An empty table stands for the figure of every bus with that key; `decimals = "all"` gives as many as a number has.
     """
     groups = read_toml(package, "figures.toml")
     return {name: tuple(_read_figure(*row) for row in rows.items()) for name, rows in groups.items()}
@@ -325,14 +302,14 @@ def _read_figure(key: str, fields: dict[str, Any]) -> Figure:
 
 
 class BusFigures(NamedTuple):
-    """Figures of a kind of bus, and where answers show them."""
+    """Figures of a kind of bus, and their places in answers."""
 
     terms: tuple[Figure, ...]
     """Figures of the terms, in the order of the wire."""
     document_terms: tuple[Figure, ...] = ()
-    """The same in the order of the JSON of `capacity`, where it differs."""
+    """Figures of the terms in the order of the JSON of `capacity`, where it differs."""
     setup: tuple[Figure, ...] = ()
-    """Figures that say how the bus is set."""
+    """Figures of the settings of the bus."""
     headings: tuple[str, ...] = ()
     """Keys of the set-up figures that a page's heading shows."""
     added: tuple[Figure, ...] = ()

@@ -16,7 +16,7 @@ from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, ne
 from busplan.sourced import Grade
 
 Value = int | float | str
-"""A value of a profile's key."""
+"""Value of a profile's key."""
 
 
 class TimingModel(NamedTuple):
@@ -34,29 +34,32 @@ class Safety(NamedTuple):
     setting: str = "setting"
     """Name of the setting in sentences."""
     figure: Figure | None = None
-    """The figure that says whether every safety limit holds."""
+    """Figure that tells whether every safety limit holds."""
     after_reset: Mapping[str, Value] = {}
-    """Keys as they are after a bus reset, until somebody sets them again."""
+    """Values of keys after a bus reset, until somebody sets them again."""
 
 
 KeyRole = Literal["cable", "clock", "host", "pipeline"]
-"""Part of a machine that a key of any kind stands for: the length of a cable [m], whether the nodes have a common
-clock, the host's own time in the cycle, whole periods that the host adds to a loop."""
+"""Part of a machine that a key of any kind stands for.
+
+It is the length of a cable [m], a common clock of the nodes, the host's own time in the cycle, or the whole periods
+that the host adds to a loop.
+"""
 
 
 class Key(NamedTuple):
     """Facts about a key of a profile that its schema does not have."""
 
     symbol: str = ""
-    """Symbol in formulas, if not its name."""
+    """Symbol in formulas, if not the key's name."""
     default: str = ""
-    """Name of the constant that is its default."""
+    """Name of the constant that is the default."""
     grade: Grade | None = None
-    """Best grade that its value can have, if below the grade "given"."""
+    """Best grade that the value can have, if below the grade "given"."""
     meaning: str = ""
-    """What a change of it means on the machine, where the key does not say it."""
+    """Meaning of a change on the machine, where the key does not give it."""
     chooses: bool = False
-    """Whether its value selects a formula: a derivation then lists it among its inputs."""
+    """Whether the value selects a formula; a derivation then lists it among its inputs."""
     role: KeyRole | None = None
     """Part of the machine that the key describes, if other kinds have a key for it, too."""
 
@@ -67,24 +70,24 @@ class EventKind(NamedTuple):
     key: str
     label: str
     reference: str
-    """Number of the equation that its time comes from, or where else it comes from."""
+    """Number of the equation that gives its time, or another source."""
     mark: str
     """Character of the event in a terminal."""
     ink: Ink
 
 
 IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
-"""The rest of the slice."""
+"""Rest of the slice."""
 
 
 COVERAGE: Final = 2
 """Coverage factor k: k standard uncertainties cover at least 95 %, on one side (JCGM 100, 6.2)."""
 KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
-"""Verdicts on a limit, the better first."""
+"""Verdicts on a limit, the best first."""
 
 
 _MOST: Final = 1e300
-"""A number so large that none of a plan comes near it, and that may be subtracted from infinity."""
+"""A number above every value of a plan, small enough to be subtracted from infinity."""
 
 
 Role = Literal["cycle", "safety", "period"]
@@ -279,9 +282,9 @@ class Starter(NamedTuple):
     """Parts of a new profile that the kind decides."""
 
     bus: str
-    """Section [bus], as TOML without its nodes and its host."""
+    """Section [bus] in TOML, without its nodes and its host."""
     hosts: Mapping[str, str] = {}
-    """Hosts to choose from by name, each with its lines of [bus]; none where the host plays no part."""
+    """Hosts to choose from, each with its lines of [bus]; none where the host plays no part."""
     host: str = ""
     """Host of a new profile, unless another is asked for."""
     period: str = "1ms"
@@ -289,17 +292,17 @@ class Starter(NamedTuple):
     slice_ratio: str = "1            # the whole period is for communication"
     """Value of cycle.slice_ratio, with a comment."""
     measure: str = "measure it on a node"
-    """Advice how to find execution times: a format with `file`, the profile, and `group`, an option of `calibrate`."""
+    """Advice on finding execution times: a format with `file`, the profile, and `group`, an option of `calibrate`."""
     node: str = ""
-    """Commented lines of a node, for what no default is right for."""
+    """Commented lines of a node, for keys that have no right default."""
     variants: Mapping[str, str] = {}
-    """Another bus of the kind by its name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
+    """Other buses of the kind by name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
     rate: str = ""
-    """Key of [bus] with a bit rate that a user is asked for; empty where there is one alone."""
+    """Key of [bus] with a bit rate that a user is asked for; empty where there is only one."""
     base: str = "what a node does in each cycle"
     """Meaning of execution.base_us."""
     table: str = ""
-    """Keys of an execution time that was published, in place of a guess."""
+    """Keys of a published execution time, in place of a guess."""
     more: str = ""
     """Commented lines at the end of the profile."""
 
@@ -317,7 +320,7 @@ per_byte_us = 0.1          # assumed: what each byte adds
         )
 
     def section(self, host: str | None = None, variant: str = "") -> str:
-        """Section [bus] with the lines of a host, by default of `host`, and those of a variant, or its own section."""
+        """Section [bus] with the lines of a host, by default `host`, and those of a variant, or the variant's own."""
         more = self.variants.get(variant, "")
         bus, more = (more, "") if more.startswith("[bus]") else (self.bus, more)
         return "\n".join(filter(None, (bus, self.hosts.get(host or self.host), more)))
@@ -339,33 +342,33 @@ class Cost(IntEnum):
     PERIOD = 6
     """A requirement of the machine."""
     NODES = 7
-    """Nodes that go to a second bus."""
+    """Nodes moved to a second bus."""
 
 
 class Setting(NamedTuple):
     """A setting of the bus that a plan may change without new parts."""
 
     name: str
-    """Name in options: gap_count."""
+    """Name in options, such as gap_count."""
     label: str
-    """Name in a sentence: gap count."""
+    """Name in a sentence, such as gap count."""
     cost: Cost
     keys: tuple[str, ...]
-    """Dotted keys that it changes."""
+    """Dotted keys that the setting changes."""
     values: tuple[Mapping[str, Value], ...]
-    """Other values that this network could have, as new values by key: safe ones first, then the smallest change."""
+    """Other values for this network, as new values by key: safe ones first, then the smallest change."""
 
 
 class Perturbation(NamedTuple):
-    """A small change of a profile, made to see what it does to the margin."""
+    """A small change of a profile that shows its effect on the margin."""
 
     label: str
     changes: Mapping[str, Value]
     """New value by dotted key."""
     why_not: str = ""
-    """Why it cannot be made here; empty where it can."""
+    """Reason why the change cannot be made here; empty where it can."""
     if_nothing: str = ""
-    """Why the margin stays as it is, where it does."""
+    """Reason for an unchanged margin, where there is one."""
 
 
 class PayloadRange(NamedTuple):
@@ -374,7 +377,7 @@ class PayloadRange(NamedTuple):
     step_bytes: int
     most_bytes: int
     carrier: str = "a packet"
-    """What holds a payload and bounds it, for messages."""
+    """Name, in messages, of the carrier that bounds a payload."""
 
 
 class PacketTime(NamedTuple):
@@ -390,21 +393,23 @@ class MeasuredLatencies(NamedTuple):
     """Calibration of execution times from latencies that were measured on a kind of bus."""
 
     packets: Callable[[Network, str, str, str, int], PacketTime]
-    """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
-    payload [bytes]; a BusplanError where its latency could not be measured."""
+    """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and payload
+    [bytes]; raises a BusplanError where its latency could not be measured.
+    """
     fit_keys: Callable[[Network, str], dict[str, Value]]
     """Keys of [node.execution] that record how an execution time was fitted, by network and by the timing model whose
-    packet times were subtracted."""
+    packet times were subtracted.
+    """
 
 
 class Periods(NamedTuple):
-    """Communication periods that a kind of bus allows, ascending; empty if it allows every period [us]."""
+    """Communication periods that a kind of bus allows, ascending [us]; empty if it allows every period."""
 
     us: tuple[float, ...] = ()
 
     @property
     def longest_us(self) -> float:
-        """The longest of them; infinite where every period will do [us]."""
+        """Longest allowed period [us]; infinite where every period is allowed."""
         return self.us[-1] if self.us else inf
 
     def allows(self, period_us: float) -> bool:
@@ -418,12 +423,7 @@ class Periods(NamedTuple):
         return not self.us or period_us in self.us
 
     def shortest_us(self, least_us: Number) -> Number:
-        """The shortest allowed period of at least a time, float rounding aside; infinite where there is none [us].
-
-        Parameters
-        ----------
-        least_us
-            The time [us]; of any sort.
+        """Shortest allowed period of at least `least_us`, float rounding aside; infinite where there is none [us].
 
         Examples
         --------
@@ -446,7 +446,7 @@ class Periods(NamedTuple):
         return (*shorter, *self.us[bisect_right(self.us, period_us) :][:1])
 
     def refusal(self, period_us: float) -> str:
-        """Say that the bus does not allow a period, and which are next to it.
+        """Sentence that the bus does not allow a period, with the next shorter and longer ones.
 
         Examples
         --------
@@ -459,14 +459,14 @@ class Periods(NamedTuple):
 
 
 ANY_PERIOD: Final = Periods()
-"""Every period will do."""
+"""Periods of a bus that allows every period."""
 
 PERIOD_LIMIT: Final = "period"
-"""Key of the limit."""
+"""Key of the limit on the period."""
 
 
 def period_limit(periods: Periods) -> Limit:
-    """The limit that the bus must allow the period."""
+    """Limit on the period, which the bus must allow."""
     return ExactLimit(
         PERIOD_LIMIT,
         lambda network: periods.refusal(network.period_us),
@@ -486,24 +486,24 @@ def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def nodes_limit(nodes: str, most: Callable[[], float], bus: str, *, of: str = "of a", has_rule: bool = False) -> Limit:
-    """The limit on the nodes of a bus, by what both are called; `of` stands between the number and the bus."""
+    """Limit on the nodes of a bus, by the names of both; `of` stands between the number and the bus."""
     over, way_out = f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}", f"a second {bus} has {{most:g}} more"
     return ExactLimit("nodes", over, lambda network: network.nodes, lambda _: most(), way_out, has_rule=has_rule)
 
 
 NODE: Final = "node"
-"""Key of the limit."""
+"""Key of the limit on a node's execution."""
 
 
 def slow_groups(network: Network) -> Iterator[Group]:
-    """Groups whose nodes are not shown to finish within their period; of plain numbers."""
+    """Groups whose nodes are not shown to finish within their period, in plain numbers."""
     for group in network.groups:
         if _busy_us(group) + COVERAGE * _busy_doubt_us(group) > network.period_us * group.every:
             yield group
 
 
 def busy_words(group: Group, network: Network) -> str:
-    """Say how long a node of a group executes, and its period; of plain numbers."""
+    """Words for the execution time of a node of a group, and its period, in plain numbers."""
     doubt_us = COVERAGE * _busy_doubt_us(group)
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
     busy, most = told_apart(_busy_us(group), (network.period_us * group.every))
@@ -516,7 +516,7 @@ def _busy_us(group: Group) -> Number:
 
 
 def _busy_doubt_us(group: Group) -> Number:
-    """Standard uncertainty of that time: read and write have the same source, so their errors add [us]."""
+    """Standard uncertainty of `_busy_us`: read and write have the same source, so their errors add [us]."""
     return group.read_uncertainty_us + group.write_uncertainty_us
 
 
@@ -526,7 +526,7 @@ def _all_busy_words(network: Network) -> str:
 
 
 def _busiest_us(network: Network, coverage: int) -> Number:
-    """Most execution time per cycle, divided by n for every n-th cycle, plus `coverage` standard uncertainties [us]."""
+    """Largest execution time per cycle (over n for every n-th cycle) plus `coverage` standard uncertainties [us]."""
     if not network.groups:
         return 0.0
     busy_us = ((_busy_us(group) + coverage * _busy_doubt_us(group)) / group.every for group in network.groups)

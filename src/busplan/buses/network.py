@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 class Rate(NamedTuple):
-    """Rate of a group whose data go in every n-th cycle; of plain numbers."""
+    """Rate of a group that has data in every n-th cycle, in plain numbers."""
 
     every: int
-    """n: one cycle in n has the data [1]."""
+    """Distance n of the cycles with its data [cycles]."""
     first: int = 1
     """First cycle with the data, from 1 to n."""
 
@@ -26,12 +26,12 @@ class Rate(NamedTuple):
 
 
 def hyperperiod(rates: Iterable[Rate]) -> int:
-    """Cycles after which the groups repeat: the hyperperiod [1]."""
+    """Number of cycles after which the groups repeat, the hyperperiod [1]."""
     return lcm(*(rate.every for rate in rates))
 
 
 def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int, ...]]:
-    """Cycles of the hyperperiod, by which groups are due in them.
+    """Cycles of the hyperperiod, by the groups that are due in them.
 
     Examples
     --------
@@ -45,12 +45,11 @@ def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int
 
 
 class Group(NamedTuple):
-    """Nodes that are alike. The numbers may be of any sort."""
+    """Nodes that are alike; floats, arrays or traced numbers."""
 
     members: tuple[ProfileGroup, ...]
-    """The profile's groups merged into this one: adjacent ones that differ only in name and number of nodes."""
+    """Groups of the profile that this one merges: adjacent ones that differ only in name and number of nodes."""
     nodes: Number
-    """Number of nodes [1]."""
     axes: Number
     """Axes of each node [1]."""
     read_bytes: Number
@@ -58,9 +57,9 @@ class Group(NamedTuple):
     write_bytes: Number
     """Payload that is written to each node [bytes]."""
     read_execution_us: Number
-    """Execution time of a read in the node [us]."""
+    """Execution time of a read in a node [us]."""
     write_execution_us: Number
-    """Execution time of a write in the node [us]."""
+    """Execution time of a write in a node [us]."""
     worst_extra_us: Number = 0.0
     """Extra time of the slowest execution [us]."""
     read_uncertainty_us: Number = 0.0
@@ -70,7 +69,7 @@ class Group(NamedTuple):
 
     @property
     def node(self) -> Any:
-        """A node of the group, an object of the kind's own model: how it executes and answers."""
+        """A node of the group, an object of the kind's own model, with its execution and answers."""
         return self.members[0].node
 
     @property
@@ -80,13 +79,13 @@ class Group(NamedTuple):
 
     @property
     def every(self) -> Number:
-        """n: the data of the group are in every n-th cycle [1]."""
+        """Distance n of the cycles with the group's data [cycles]."""
         number: Number = getattr(self.payload, "every", 1)
         return number
 
     @property
     def is_slower(self) -> bool:
-        """Whether there are cycles without its data; of an array, at any point."""
+        """Whether there are cycles without its data; in an array, at any point."""
         return not is_everywhere(self.every <= 1)
 
     @property
@@ -104,12 +103,11 @@ class Group(NamedTuple):
 
 
 class Network(NamedTuple):
-    """Inputs of the cycle of a profile. The numbers may be of any sort: floats, arrays, traced numbers."""
+    """Inputs of the cycle of a profile: floats, arrays or traced numbers."""
 
     profile: Any
-    """The profile, an object of the kind's own model. Its values may be numbers of any sort."""
+    """The profile, an object of the kind's own model; its numbers are floats, arrays or traced numbers."""
     bus: "Bus"
-    """The kind of bus."""
     groups: tuple[Group, ...]
     period_us: Number
     slice_ratio: Number
@@ -119,7 +117,7 @@ class Network(NamedTuple):
 
     @property
     def nodes(self) -> Number:
-        """Distributed nodes N, host not counted [1]."""
+        """Number N of distributed nodes, host not counted [1]."""
         return total(group.nodes for group in self.groups)
 
     @property
@@ -129,7 +127,7 @@ class Network(NamedTuple):
 
     @property
     def largest_payload_bytes(self) -> Number:
-        """The largest payload of any transaction [bytes]."""
+        """Largest payload of any transaction [bytes]."""
         sizes = [size for group in self.groups for size in (group.read_bytes, group.write_bytes)]
         return reduce(larger, sizes)
 
@@ -145,28 +143,16 @@ class Network(NamedTuple):
 
     @property
     def varied_group(self) -> ProfileGroup:
-        """The profile's group that `with_nodes` changes."""
+        """Group of the profile that `with_nodes` changes."""
         groups: tuple[ProfileGroup, ...] = self.profile.node_groups
         return next(group for group in groups if group.name == self.varied)
 
     def varying(self, name: str) -> "Network":
-        """The same network, with the group of the profile chosen that `with_nodes` changes.
-
-        Parameters
-        ----------
-        name
-            Name of the group; empty for the nodes of [node].
-        """
+        """The same network, with group `name` as the one that `with_nodes` changes; empty for the nodes of [node]."""
         return self._replace(varied=name)
 
     def with_nodes(self, nodes: Number) -> "Network":
-        """The same network with another number of nodes in its varied group.
-
-        Parameters
-        ----------
-        nodes
-            Nodes of that group; of any sort [1].
-        """
+        """The same network with another number of nodes in its varied group [1]."""
         return self._replace(groups=tuple(self._with_nodes(group, nodes) for group in self.groups))
 
     def _with_nodes(self, group: Group, nodes: Number) -> Group:

@@ -1,4 +1,4 @@
-"""The data files with published and measured figures."""
+"""Data files with published and measured figures."""
 
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -10,25 +10,12 @@ from busplan.sourced import read_toml
 
 @cache
 def published(name: str) -> dict[str, Any]:
-    """Published figures, as a data file of the package holds them.
-
-    Parameters
-    ----------
-    name
-        Name of the file.
-    """
+    """Published figures in the data file of that name, from the package."""
     return read_toml("busplan", f"data/{name}.toml")
 
 
 def rows_of(name: str, part: str) -> list[dict[str, Any]]:
-    """Rows of evidence of a part of the model, in all tables of a data file.
-
-    Parameters
-    ----------
-    name
-        Name of the file.
-    part
-        The part, as the tables have it.
+    """Rows of evidence of one part of the model, from all tables of a data file.
 
     Examples
     --------
@@ -39,11 +26,11 @@ def rows_of(name: str, part: str) -> list[dict[str, Any]]:
 
 
 class Spread(NamedTuple):
-    """Several measurements of one quantity, in their unit."""
+    """Mean and spread of several measurements of one quantity, in their unit."""
 
     mean: float
     uncertainty: float
-    """Standard uncertainty of the next measurement: sd sqrt(1 + 1/n) (JCGM 100, 4.2)."""
+    """Standard uncertainty of one further measurement: sd sqrt(1 + 1/n) (JCGM 100, 4.2)."""
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "Spread":
@@ -64,7 +51,7 @@ class Tested(NamedTuple):
     """Parts of a kind's model that published figures set, and parts that independent figures test."""
 
     set_by: Mapping[str, str]
-    """Source of the constants, bias or U of each part, in a few words: it tests none of them."""
+    """Source of the constants, bias or U of each part, in a few words; it tests none of the parts."""
     parts: Mapping[str, str]
     """Figures that test each part, and set nothing of it."""
     untested: tuple[str, ...]
@@ -72,13 +59,7 @@ class Tested(NamedTuple):
 
 
 def parts_tested(names: Sequence[str]) -> Tested:
-    """The parts that some data files set and test, by their tables [set_by] and [tested], and those not tested.
-
-    Parameters
-    ----------
-    names
-        The files.
-    """
+    """Parts that data files set and test, by their tables [set_by] and [tested], and parts that they do not test."""
 
     def parts(table: str) -> dict[str, str]:
         return {part: _words(name, part, row) for name in names for part, row in published(name).get(table, {}).items()}

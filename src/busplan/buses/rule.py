@@ -1,4 +1,4 @@
-"""What a kind of bus gives the gate and `measured`: rules, and figures of a recording."""
+"""Parts of a kind of bus for the gate and `measured`: rules, and figures of a recording."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -16,7 +16,7 @@ Severity = Literal["error", "warning"]
 
 
 class Mending(NamedTuple):
-    """How to fix a problem."""
+    """Advice that fixes a problem."""
 
     help: str = ""
     """Advice in words."""
@@ -25,21 +25,21 @@ class Mending(NamedTuple):
 
 
 class RuleProblem(NamedTuple):
-    """A problem that a rule reports: the dotted key that causes it, what is wrong, and how to fix it."""
+    """A problem that a rule reports: the dotted key that causes it, the fault, and its fix."""
 
     key: str
     message: str | Callable[[], str]
-    """The problem in words; or a function that writes them if that is slow, not called for a suppressed problem."""
+    """The problem in words, or a function for words that are slow to write, not called for a suppressed problem."""
     help: str = ""
     cure: tuple[str, ...] = ()
 
 
 RuleFigures: TypeAlias = Any
-"""Figures of `capacity` under a timing model: each figure, also of the kind, is an attribute with its key."""
+"""Figures of `capacity` under a timing model: each figure, also of the kind, is an attribute named by its key."""
 
 
 class RuleSubject(Protocol):
-    """A profile, and all that rules may ask about it."""
+    """A profile, and all questions that rules may ask about it."""
 
     @property
     def profile(self) -> "Profile":
@@ -47,7 +47,7 @@ class RuleSubject(Protocol):
 
     @property
     def network(self) -> "Network":
-        """Its network."""
+        """Network of the profile."""
 
     @property
     def deciding(self) -> RuleFigures:
@@ -61,10 +61,10 @@ class RuleSubject(Protocol):
         """Capacity under the timing model that decides, with other values by dotted key."""
 
     def counts(self, changes: Mapping[str, "Value"] | None = None) -> Sequence[Any]:
-        """How many nodes fit and are shown to fit, by group or in all, with other values by dotted key."""
+        """Numbers of nodes that fit and that are shown to fit, by group or in all, with other values by dotted key."""
 
     def limit_words(self, key: str) -> str:
-        """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
+        """Words for the excess over a limit of the bus, or for why it is not shown to be kept."""
 
     def cure(self) -> Mending:
         """The least change after which the profile holds every constraint of a plan."""
@@ -83,21 +83,13 @@ class Rule(NamedTuple):
     summary: str
     """The problem in one line."""
     explanation: str
-    """Why it matters and how to fix it."""
+    """Reason why the problem matters, and its fix."""
     check: Check | None = None
-    """None where another part of the gate reports the problem."""
+    """Check of the rule; None where another part of the gate reports the problem."""
 
 
 def read_rules(package: str, checks: Mapping[str, Check]) -> tuple[Rule, ...]:
-    """Read the rules of a package from its `rules.toml`; line breaks in an explanation become spaces.
-
-    Parameters
-    ----------
-    package
-        The package.
-    checks
-        Checks by the code of their rule.
-    """
+    """Rules of a package from its `rules.toml`, with checks by the code of their rule; line breaks become spaces."""
     rules = read_toml(package, "rules.toml")
     for rule in rules.values():
         rule["explanation"] = " ".join(rule["explanation"].split())
@@ -105,16 +97,10 @@ def read_rules(package: str, checks: Mapping[str, Check]) -> tuple[Rule, ...]:
 
 
 def contradicts(fits: bool, figures: RuleFigures) -> bool:
-    """Tell whether a timing model that does not decide contradicts the verdict.
+    """Whether a timing model that does not decide contradicts the verdict.
 
-    A cycle of the deciding model that lacks only room for U contradicts nothing; a broken limit is not about timing.
-
-    Parameters
-    ----------
-    fits
-        Whether required <= available under that model.
-    figures
-        Figures under the model that decides.
+    `fits` tells whether required <= available under that model; `figures` are those of the model that decides. A cycle
+    of the deciding model that lacks only room for U contradicts nothing; a broken limit is not about timing.
     """
     if set(figures.exceeded) - {"time"}:
         return False
@@ -126,7 +112,7 @@ _MOST_DECIMALS: Final = 9
 
 
 def told_apart(first: float, second: float) -> tuple[str, str]:
-    """Write two numbers with one decimal, or with as many as tell them apart.
+    """Two numbers with one decimal, or with as many as tell them apart.
 
     Examples
     --------
@@ -141,13 +127,13 @@ def told_apart(first: float, second: float) -> tuple[str, str]:
 
 
 def overrun(figures: RuleFigures) -> str:
-    """Say what a cycle needs of its slice, and the margin as far as it is known."""
+    """Words for the share of its slice that a cycle needs, and for its margin as far as it is known."""
     needs, given = told_apart(figures.required_us, figures.available_us)
     return f"needs {needs} us of {given} us, {margin(figures)}"
 
 
 def margin(figures: RuleFigures) -> str:
-    """Say how large the margin is, as far as it is known."""
+    """Words for the margin as far as it is known."""
     if figures.margin_corrected_us is None:
         return f"margin {told_apart(figures.margin_us, 0.0)[0]} us under the {figures.timing_model} timing"
     value = told_apart(figures.margin_corrected_us, 0.0)[0]
@@ -182,26 +168,26 @@ class RecordedFigure(NamedTuple):
 
     quantity: str
     unit: Literal["us", "bytes", "1", "share", "kbit/s"]
-    """A share is 0..1."""
+    """Unit of both values; a share is 0..1."""
     planned: float | None
     recorded: float | None
-    """None where the recording does not show it."""
+    """Recorded value; None where the recording does not show it."""
     uncertainty: float | None
     """Expanded uncertainty (k = 2) of the difference; None where it is not known, or where nothing is planned."""
     sense: Sense
     events: int
-    """Number of events that it is computed from [1]."""
+    """Number of events that the value is computed from [1]."""
     key: str = ""
     """Dotted key of the planned value in the profile."""
     note: str = ""
     is_mean: bool = False
-    """Whether it is the mean of its events and not their quantile."""
+    """Whether the value is the mean of its events and not their quantile."""
     hidden: str = ""
-    """Why the recording cannot show it, though something is planned; empty where it can."""
+    """Reason why the recording cannot show a planned figure; empty where it can."""
 
     @property
     def residual(self) -> float | None:
-        """Recorded - planned."""
+        """Recorded value less planned value."""
         return None if self.planned is None or self.recorded is None else self.recorded - self.planned
 
     @property
@@ -215,8 +201,8 @@ class RecordedFigure(NamedTuple):
     def verdict(self) -> RecordedVerdict | None:
         """Verdict on the plan; None where nothing is planned.
 
-        A worst case is within without an excess; a mean, and a figure that must be equal, also with one of up to U. An
-        excess of more than `SURE` times U is outside; one between is not shown.
+        A worst case without an excess is within. So are a mean, and a figure that must be equal, with an excess of up
+        to U. An excess of more than `SURE` times U is outside; one between is not shown.
         """
         if self.hidden:
             return "not shown"
@@ -233,21 +219,18 @@ class Recorded(NamedTuple):
 
     figures: tuple[RecordedFigure, ...]
     remarks: tuple[str, ...]
-    """Sentences on what else the recording has, and what it does not show."""
+    """Sentences on other contents of the recording, and on what it does not show."""
     edits: Mapping[str, object]
     """New value of each measured key, by dotted key; None removes a key."""
     day: str
-    """Day of the first stamp in UTC, such as 2026-11-23; empty where stamps do not say it."""
+    """Day of the first stamp in UTC, such as 2026-11-23; empty where stamps have no date."""
     shows_nothing: tuple[str, ...] = ()
-    """Why the recording as a whole cannot show that the machine keeps its plan, a sentence each; empty where it can."""
+    """Reasons why the recording cannot show that the machine keeps its plan, a sentence each; empty where it can."""
 
     def unless_synthetic(self, synthetic: str) -> "Recorded":
-        """The same, where no emulation is the recording's origin; else nothing of it is measured or shown.
+        """The same comparison, or for the recording of an emulation one in which nothing is measured or shown.
 
-        Parameters
-        ----------
-        synthetic
-            What the recording says of an emulation; empty where it says of none.
+        `synthetic` is what the recording says of an emulation; empty where it names none.
         """
         if not synthetic:
             return self

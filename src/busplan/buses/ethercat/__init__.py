@@ -1,1 +1,1 @@
-"""EtherCAT: frames that pass all devices and come back, with process data of each device, in every cycle."""
+"""EtherCAT: frames that pass all devices and come back in every cycle, with process data of each device."""

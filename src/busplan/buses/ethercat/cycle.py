@@ -54,21 +54,21 @@ EVENTS: Final = (
     EventKind("receive", "receiving again", "acontis", "<", "in"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
-"""Kinds of events, in the order of the cycle."""
+"""Kinds of events in the order of the cycle."""
 STRETCHES: Final = (
     EventKind("frame", "frames", "", "F", "out"),
     EventKind("way", "way through the devices", "", "W", "work"),
 )
-"""Kinds of a sequence of events."""
+"""Kinds of stretches, each a sequence of events."""
 
 
 def sync0_us(network: Network) -> Number:
-    """Time from the master's task to the first SYNC0; 0 without distributed clocks [us]."""
+    """Time from the master's task to the first SYNC0 [us]; 0 without distributed clocks."""
     return sync0_share(network) * network.period_us if network.profile.bus.distributed_clocks else 0.0
 
 
 def sync0_share(network: Network) -> Number:
-    """The same as a share of the period; 1 for a shift of 0, since frames come after the SYNC0 at the task [1]."""
+    """Share of the period up to the first SYNC0 [1]; 1 for a shift of 0, since frames follow the SYNC0 at the task."""
     shift = network.profile.bus.sync_shift
     return choose(shift > 0, shift, 1)
 
@@ -99,16 +99,16 @@ class EthercatCycle(BusCycle):
 
     @property
     def rates(self) -> tuple[Rate, ...]:
-        """The rate of each group with its first cycle."""
+        """Rate and first cycle of each group."""
         return rates(self.network)
 
     def at(self, number: int) -> "EthercatCycle":
-        """A cycle of the hyperperiod."""
+        """Cycle `number` of the hyperperiod."""
         return EthercatCycle(self.network, self.model, number)
 
     @property
     def fullest(self) -> int:
-        """The first cycle with the most bytes on the wire."""
+        """Number of the first cycle with the most bytes on the wire."""
         return cycles_of(self.network)[0].numbers[0]
 
     @cached_property
@@ -117,7 +117,7 @@ class EthercatCycle(BusCycle):
 
     @cached_property
     def packing(self) -> Packing:
-        """The frames of process data."""
+        """Frames of the process data."""
         return packing(self.network, self._devices)
 
     @cached_property
@@ -134,7 +134,7 @@ class EthercatCycle(BusCycle):
 
     @cached_property
     def _receive_us(self) -> Number:
-        """Reception of the last frame, in the vendors' model [us]."""
+        """Time to receive the last frame, in the vendors' model [us]."""
         if not self.counts_reception:
             return 0.0
         is_empty = self.number is not None and not self.packing.frames
@@ -143,7 +143,7 @@ class EthercatCycle(BusCycle):
 
     @property
     def most_required_us(self) -> Number:
-        """Upper bound over all smaller node counts: a node more may open a short frame, which is received faster."""
+        """Upper bound over all smaller node counts [us]: one more node may open a short frame, which arrives sooner."""
         if not self.counts_reception:
             return self.required_us
         last_us, before_us = (
@@ -151,7 +151,7 @@ class EthercatCycle(BusCycle):
             for datagrams_bytes in (self.packing.last_bytes, self.packing.before_bytes)
         )
         polls = self.network.profile.bus.mailbox_polls
-        # Without that frame, neither its sending nor its reception counts, but the reception of the frame before.
+        # Without that frame its sending and reception do not count; the reception of the frame before does.
         lost_us = choose(self.packing.before_bytes > 0, larger(before_us - 2 * last_us, 0.0), 0.0)
         return self.required_us + choose(polls > 0, 0.0, lost_us)
 
@@ -174,11 +174,11 @@ class EthercatCycle(BusCycle):
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
-        """Time of process data in addition to the wire: about a copy in the host [us]."""
+        """Time of process data beyond the wire [us]: about one copy in the host."""
         return self.process_bytes * c.BYTE_BIAS_US
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The delays of devices, the master's own time, and the time of bytes in addition to the wire."""
+        """Doubts of the devices' delays, of the master's own time, and of the time of bytes beyond the wire."""
         return (
             *devices_doubts(self.network),
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
@@ -186,7 +186,7 @@ class EthercatCycle(BusCycle):
         )
 
     def _frames(self) -> Iterator[BusEvent]:
-        """Each frame: its overhead, then the data of each device in it."""
+        """Events of the frames: of each its overhead, then the data of each device in it."""
         sizes = [group.data_bytes for group in self._devices for _ in range(int(group.number))]
         number = 0
         for run in frames(self.network, self._devices):
@@ -200,7 +200,7 @@ class EthercatCycle(BusCycle):
                     yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
-        """The path of the last byte to each device and through it, and back."""
+        """Events of the last byte's path to each device, through it, and back."""
         way, device = [], 0
         for group in self.network.groups:
             to_us, through_us = cable_us(group.node.cable_length_m) / 2, hop_us(group) / 2
@@ -225,7 +225,7 @@ class EthercatCycle(BusCycle):
         }
 
     def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002 - its margin is said elsewhere
-        """For groups with rates of their own: the cycle of the verdict, and the mean cycle."""
+        """Lines on the cycle of the verdict and on the mean cycle; none where all groups have the same rate."""
         if not has_rates(self.network):
             return ()
         cycles = cycles_of(self.network)
@@ -244,7 +244,7 @@ class EthercatCycle(BusCycle):
 
     @property
     def _mean_us(self) -> Number:
-        """What the mean cycle needs [us]."""
+        """Time that the mean cycle needs [us]."""
         network = self.network
         if not has_rates(network):
             return self.required_us
@@ -255,15 +255,11 @@ class EthercatCycle(BusCycle):
         return others_us + sending_us(mean_wire_bytes(network, with_reception=receives_last))
 
     def arrival_us(self, node: int) -> float:
-        """When a device has its command, from the start of a cycle of plain numbers [us].
+        """Time from the start of a cycle to the command of device `node`, which counts from 1, in plain numbers [us].
 
-        It takes its command at the end of its frame, after the check sequence. The frames are those of the fullest
-        cycle and start as late as the master's jitter allows; a device without data in them counts as in the last.
-
-        Parameters
-        ----------
-        node
-            Number of the device, from 1.
+        A device takes its command at the end of its frame, after the check sequence. The frames are those of the
+        fullest cycle and start as late as the master's jitter allows. A device without data in them counts as if it
+        were in the last frame.
         """
         network = self.network
         sent_us = network.profile.bus.master_us + network.profile.bus.master_jitter_us
@@ -281,7 +277,7 @@ class EthercatCycle(BusCycle):
         return float(sent_us + way_us)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """The master's pipeline, and the periods that feedback waits for a frame and a command for SYNC0 [1].
+        """Periods inside a loop: the master's pipeline, and the waits for a frame and for SYNC0 [1].
 
         The slowest group counts; groups at slower rates are left out.
         """
@@ -299,7 +295,7 @@ class EthercatCycle(BusCycle):
         return int(max(map(waits, groups)) + network.profile.bus.pipeline_cycles)
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """The worst case of a command, of feedback, and of a loop over both, for each group."""
+        """Worst case of a command, of feedback, and of a loop over both, for each group."""
         latencies = []
         for group in self.network.groups:
             command, feedback = self._command(group), self._feedback(group)
@@ -313,12 +309,12 @@ class EthercatCycle(BusCycle):
 
     @property
     def last_command_us(self) -> Number:
-        """Latest time at which the last device has taken its command, from the master's task [us]."""
+        """Latest time from the master's task until the last device has taken its command [us]."""
         return reduce(larger, map(self._taken_us, self.network.groups))
 
     @property
     def command_doubt_us(self) -> Number:
-        """Standard uncertainty of that: master, devices one way, bytes and slowest execution [us]."""
+        """Standard uncertainty of `last_command_us`: master, devices one way, bytes and slowest execution [us]."""
         execution_us = reduce(larger, (group.write_uncertainty_us for group in self.network.groups))
         parts = (
             self.network.profile.bus.master_doubt_us,
@@ -330,7 +326,7 @@ class EthercatCycle(BusCycle):
 
     @cached_property
     def _sent_us(self) -> Number:
-        """All frames of process data of the fullest cycle [us]."""
+        """Time of all frames of process data of the fullest cycle [us]."""
         return process_us(self.network, devices(self.network))
 
     @cached_property
@@ -341,13 +337,13 @@ class EthercatCycle(BusCycle):
 
     @step("t_cmd", "command_us")
     def _taken_us(self, group: Group) -> Number:
-        """Latest time at which a group has taken its command, as if at the end of the segment [us]."""
+        """Latest time at which a group has taken its command, as if it stood at the end of the segment [us]."""
         bus = self.network.profile.bus
         on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
         return on_wire_us + group.write_execution_us + group.worst_extra_us
 
     def _command(self, group: Group) -> dict[str, Number]:
-        """Phases of a command: from the cycle with the feedback it is computed from, to its effect."""
+        """Phases of a command, from the cycle with the feedback it is computed from to its effect [us]."""
         network, bus = self.network, self.network.profile.bus
         taken_us = self._taken_us(group)
         wait_us: Number = 0.0
@@ -366,7 +362,7 @@ class EthercatCycle(BusCycle):
         }
 
     def _feedback(self, group: Group) -> dict[str, Number]:
-        """Phases of feedback: from the sample through the wait for a frame, until the master has all frames."""
+        """Phases of feedback, from the sample through the wait for a frame until the master has all frames [us]."""
         network, bus = self.network, self.network.profile.bus
         ready_us = group.read_execution_us + group.worst_extra_us
         ready_at_us = sync0_us(network) + ready_us
@@ -384,10 +380,10 @@ class EthercatCycle(BusCycle):
 
 
 def _period_us(group: Group, network: Network) -> Number:
-    """Time from a cycle with the group's data to the next [us]."""
+    """Time from one cycle with the group's data to the next [us]."""
     return group.every * network.period_us if group.is_slower else network.period_us
 
 
 def _until_taken(ready: Number) -> Number:
-    """Periods from a cycle's task to the frame with its sample, ready after `ready` of them: never the cycle's own."""
+    """Periods from a cycle's task to the frame that takes its sample, ready after `ready` of them; 1 or more."""
     return larger(rounded_up(ready), 1)

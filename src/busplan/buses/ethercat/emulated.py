@@ -1,4 +1,4 @@
-"""The capture of a planned EtherCAT machine: its frames as they pass the master's port, and as they return."""
+"""Capture of a planned EtherCAT machine: its frames as they leave the master's port, and as they return."""
 
 from collections.abc import Iterator, Sequence
 from struct import pack
@@ -25,11 +25,11 @@ _STATE, _SYSTEM_TIME, _MAILBOX = 0x130 << 16, 0x910 << 16, 0x1080 << 16
 """Registers in the address of a datagram: state of a device, its system time, and a usual place of its mailbox."""
 _OPERATIONAL: Final = 8
 _IMAGE, _OUTPUTS = 0x10000, 0x800000
-"""Logical address of the process image; those of outputs alone (LWR) have the other bit, too."""
+"""Logical address of the process image, and the bit that marks outputs alone (LWR) in it."""
 _MAILBOXES: Final = 0x9000000
-"""Logical address of the state of all mailboxes, at TwinCAT."""
+"""Logical address of the state of all mailboxes, as TwinCAT sets it."""
 _STATION: Final = 0x1001
-"""Address of the first device."""
+"""Station address of the first device."""
 _AS_ACONTIS: Final = (("NOP", 0, 4), ("APWR", _SYSTEM_TIME, 4), ("BRD", _STATE, 2))
 _OF_MASTER: Final = {
     "IgH": (("BRD", _STATE, 2),),
@@ -37,9 +37,9 @@ _OF_MASTER: Final = {
     "acontis": _AS_ACONTIS,
     UNNAMED: _AS_ACONTIS,
 }
-"""Command, address and data of the datagrams that `HOUSEKEEPING_BYTES` counts."""
+"""Command, address and number of data bytes of each datagram that `HOUSEKEEPING_BYTES` counts, by master."""
 _PORTS: Final = SYNTHETIC_PORT, bytes([SYNTHETIC_PORT[0] | 2]) + SYNTHETIC_PORT[1:]
-"""Source of a frame that is sent, and of one that has passed a device."""
+"""Source address of a frame that is sent, and of one that has passed a device."""
 _LEAST_PACKET: Final = 60
 
 MISSING: Final = Fault("missing-cycle", "the master sends no frame", "cycles without a frame")
@@ -54,7 +54,7 @@ class _Datagram(NamedTuple):
     address: int
     size: int
     counter: int
-    """Working counter on its return."""
+    """Working counter when the datagram returns."""
 
     @property
     def is_logical(self) -> bool:
@@ -65,22 +65,11 @@ _Frame = tuple[_Datagram, ...]
 
 
 def emulated(network: Network, emulation: Emulation) -> bytes:
-    """Emulate the capture of a machine that keeps its plan, but for the faults.
+    """Capture of a machine that keeps its plan except for the given faults.
 
-    A cycle starts evenly within the planned jitter; frames follow each other, pass all devices and return; the host
-    takes half to all of its planned time. Data are random. Stamps count from 0.
-
-    Parameters
-    ----------
-    network
-        The plan, of plain numbers.
-    emulation
-        Length, faults and random numbers.
-
-    Raises
-    ------
-    BusplanError
-        Too many frames.
+    Cycles start evenly within the planned jitter. Frames follow each other, pass all devices and return. The host takes
+    half to all of its planned time. Data are random. Stamps count from 0. The network has plain numbers; too many
+    frames raise `BusplanError`.
     """
     numbers, polls = range(1, hyperperiod(rates(network)) + 1), int(network.profile.bus.mailbox_polls)
     cycles = [tuple(_cycle(network, number)) for number in numbers]
@@ -94,7 +83,7 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
 def _packets(
     network: Network, emulation: Emulation, cycles: Sequence[tuple[_Frame, ...]], due: Sequence[int]
 ) -> Iterator[tuple[int, bytes]]:
-    """Stamps [ns] and packets, each sent one before its return; faults hit the last frame of a cycle that is due."""
+    """Stamps [ns] and packets, each as sent and then as returned; faults hit the last frame of a cycle that is due."""
     bus, random = network.profile.bus, emulation.random
     jitter_us, bias_us = bus.master_jitter_us, c.BYTE_BIAS_US
     nodes, way_us = int(network.nodes), devices_us(network) + cables_us(network)
@@ -103,7 +92,7 @@ def _packets(
     for cycle in range(emulation.cycles):
         late_us = jitter_us + emulation.faults[JITTER.name] if cycle in late else random.random() * jitter_us
         back_us, of_cycle = way_us + random.uniform(LEAST_SHARE, 1) * bus.master_us, cycles[cycle % len(cycles)]
-        # From a whole nanosecond on, so that stamps make no time longer than it is.
+        # A start on a whole nanosecond, so that stamps lengthen no time.
         sent_ns: float = int(max(1000 * (cycle * network.period_us + late_us), free_ns))
         for number, frame in enumerate((*of_cycle, *_polls(network, cycle)) if cycle not in missing else (), start=1):
             data = [random.randbytes(part.size) if part.is_logical else b"" for part in frame]
@@ -121,12 +110,12 @@ def _bytes(part: _Datagram) -> int:
 
 
 def _packet(frame: _Frame, data: Sequence[bytes], cycle: int, *, passed: int = 0, is_taken: bool = True) -> bytes:
-    """A frame without its check sequence, sent or, where it has passed devices, returned."""
+    """A frame without its check sequence: as sent, or after it has passed some devices."""
     body = b""
     for place, (part, content) in enumerate(zip(frame, data, strict=True), start=1):
         address, state = part.address, _OPERATIONAL if passed and part.address & ~0xFFFF == _STATE else 0
         if part.command in ("APWR", "ARMW", "BRD"):
-            address += passed  # each device adds 1
+            address += passed  # Each device adds 1.
         size = part.size | (0x8000 if place < len(frame) else 0)
         body += pack("<BBIHH", _CODES[part.command], cycle % 256, address, size, 0)
         body += content or state.to_bytes(part.size, "little")
@@ -136,8 +125,8 @@ def _packet(frame: _Frame, data: Sequence[bytes], cycle: int, *, passed: int = 0
 
 
 def _cycle(network: Network, number: int) -> Iterator[_Frame]:
-    """The frames of process data of a cycle of the hyperperiod, from 1."""
-    places: list[tuple[int, int, int]] = []  # of each device its inputs, its outputs, and its logical address
+    """Frames of process data in cycle `number` of the hyperperiod, which counts from 1."""
+    places: list[tuple[int, int, int]] = []  # Inputs, outputs and logical address of each device.
     address = _IMAGE
     for group, rate in zip(network.groups, rates(network), strict=True):
         both = int(group.read_bytes), int(group.write_bytes)
@@ -153,7 +142,7 @@ def _cycle(network: Network, number: int) -> Iterator[_Frame]:
 
 
 def _fitting(parts: _Frame) -> Iterator[_Frame]:
-    """Datagrams in frames: state checks of many devices fill frames of their own."""
+    """Frames filled with the datagrams; state checks of many devices fill frames of their own."""
     frame: _Frame = ()
     for part in parts:
         if frame and sum(map(_bytes, (*frame, part))) > room_bytes(0):
@@ -164,14 +153,14 @@ def _fitting(parts: _Frame) -> Iterator[_Frame]:
 
 
 def _process(devices: Sequence[tuple[int, int, int]], layout_name: str) -> _Frame:
-    """Datagrams of the process data of the devices in a frame: inputs, outputs and address of each."""
+    """Datagrams of process data in a frame; `devices` has the inputs, outputs and address of each device."""
     reads, writes, (address, *_) = zip(*devices, strict=True)
     reading, writing = (sum(size > 0 for size in sizes) for sizes in (reads, writes))
     if layout_name == SPLIT:
         outputs = _Datagram("LWR", address | _OUTPUTS, sum(writes), writing)
         return _Datagram("LRD", address, sum(reads), reading), outputs
     size = sum(map(max, reads, writes)) if layout_name == SHARED else sum(reads) + sum(writes)
-    # A read of a device adds 1, a write 2.
+    # The working counter rises by 1 for a read of a device, by 2 for a write.
     return (_Datagram("LRW", address, size, reading + 2 * writing),)
 
 

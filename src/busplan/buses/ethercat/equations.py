@@ -1,4 +1,7 @@
-"""EtherCAT in equations: sourced constants, lengths and times of frames, and the figures made of them."""
+"""EtherCAT in equations: sourced constants, lengths and times of frames, and the figures made of them.
+
+Each parameter is a float or an array, and so is the result.
+"""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -17,15 +20,15 @@ SPLIT: Final[ProcessData] = "LRD-LWR"
 Starts = Literal["datagram", "frame"]
 Master = Literal["SOEM", "IgH", "ethercrab", "TwinCAT", "acontis"]
 UNNAMED: Final = "unnamed"
-"""The master of a profile that names none."""
+"""Name of the master in a profile that names none."""
 
 LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
     {"SOEM": SEPARATE, "IgH": SEPARATE, "ethercrab": SEPARATE, "TwinCAT": SHARED, "acontis": SHARED, UNNAMED: SEPARATE}
 )
-"""Layout of the process data by master."""
+"""Layout of the process data, by master."""
 
 c: Final = Constants("busplan.buses.ethercat")
-"""Every constant with a source, by its name here."""
+"""Constants with a source, by their names."""
 
 _TX: Final = Spread.of(published("ethercat")["delays"]["tx_one_way_us"])
 c.computed("DELAY_US[100BASE-TX]", lambda _: _TX.mean)
@@ -39,12 +42,7 @@ _BOTH_WAYS: Final = 2
 
 
 def datagram_bytes(data_bytes: Number) -> Number:
-    """Bytes of a datagram: 10 of header, its data, 2 of working counter [bytes].
-
-    Parameters
-    ----------
-    data_bytes
-        Its data [bytes]; float or array.
+    """Size of a datagram: 10 of header, its data, 2 of working counter [bytes].
 
     Examples
     --------
@@ -55,7 +53,7 @@ def datagram_bytes(data_bytes: Number) -> Number:
 
 
 def overhead_bytes() -> Number:
-    """Bytes of a frame on the wire without datagrams and padding: preamble, headers, check and gap [bytes].
+    """Bytes of a frame on the wire besides datagrams and padding: preamble, headers, check and gap [bytes].
 
     Examples
     --------
@@ -66,12 +64,7 @@ def overhead_bytes() -> Number:
 
 
 def padding_bytes(datagrams_bytes: Number) -> Number:
-    """Bytes that fill a frame up to the shortest one; 0 for no frame [bytes].
-
-    Parameters
-    ----------
-    datagrams_bytes
-        All its datagrams; 0 where there is no frame [bytes]; float or array.
+    """Padding of a frame to the shortest one [bytes]; 0 where there is no frame, that is, no datagrams.
 
     Examples
     --------
@@ -83,12 +76,7 @@ def padding_bytes(datagrams_bytes: Number) -> Number:
 
 
 def frame_bytes(datagrams_bytes: Number) -> Number:
-    """Bytes of a frame on the wire: preamble, headers, datagrams, check, gap and padding [bytes].
-
-    Parameters
-    ----------
-    datagrams_bytes
-        All its datagrams [bytes]; float or array.
+    """Size of a frame on the wire: preamble, headers, datagrams, check, gap and padding [bytes].
 
     Examples
     --------
@@ -99,12 +87,7 @@ def frame_bytes(datagrams_bytes: Number) -> Number:
 
 
 def room_bytes(datagrams: int) -> float:
-    """Most process data of a frame with a number of datagrams [bytes].
-
-    Parameters
-    ----------
-    datagrams
-        Number of its datagrams [1].
+    """Most process data of a frame with `datagrams` datagrams [bytes].
 
     Examples
     --------
@@ -115,12 +98,7 @@ def room_bytes(datagrams: int) -> float:
 
 
 def sending_us(wire_bytes: Number) -> Number:
-    """Time of some bytes on the wire [us].
-
-    Parameters
-    ----------
-    wire_bytes
-        The bytes [bytes]; float or array.
+    """Time to send `wire_bytes` [us].
 
     Examples
     --------
@@ -131,12 +109,7 @@ def sending_us(wire_bytes: Number) -> Number:
 
 
 def cable_us(cable_length_m: Number) -> Number:
-    """Time that a cable takes there and back [us].
-
-    Parameters
-    ----------
-    cable_length_m
-        Its length [m]; float or array.
+    """Time of a cable there and back [us].
 
     Examples
     --------
@@ -147,12 +120,7 @@ def cable_us(cable_length_m: Number) -> Number:
 
 
 def device_us(delay_us: Number) -> Number:
-    """Time that a device takes there and back [us].
-
-    Parameters
-    ----------
-    delay_us
-        Its delay one way [us]; float or array.
+    """Time of a device there and back, from its delay one way [us].
 
     Examples
     --------

@@ -12,12 +12,12 @@ def room_bytes(_cycle: object, *, with_clocks: bool = False) -> float:
 
 
 def frame_bytes(_cycle: object, *, data_bytes: int) -> float:
-    """A frame with one datagram on the wire [bytes]."""
+    """Bytes on the wire of a frame with one datagram [bytes]."""
     return equations.frame_bytes(equations.datagram_bytes(data_bytes))
 
 
 def on_the_wire_us(_cycle: object, *, wire_bytes: int, devices: int, cable_length_m: float) -> float:
-    """Time of a frame through E-bus devices and back, each with a cable before it [us]."""
+    """Time of a frame through E-bus devices and back, with a cable before each device [us]."""
     hop_us = equations.device_us(c.by_key("DELAY_US")["E-bus"]) + equations.cable_us(cable_length_m)
     return equations.sending_us(wire_bytes) + devices * hop_us
 

@@ -1,4 +1,4 @@
-"""The frames of an EtherCAT cycle: devices packed into datagrams, groups at their rates, and delays on the way."""
+"""Frames of an EtherCAT cycle: devices packed into datagrams, groups at their rates, and delays on the path."""
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
@@ -45,21 +45,20 @@ from busplan.sourced import cached
 
 
 class Devices(NamedTuple):
-    """Adjacent devices with the same process data. The numbers may be of any sort."""
+    """Adjacent devices with the same process data; floats, arrays or traced numbers."""
 
     number: Number
     """Number of devices [1]."""
     data_bytes: Number
     """Process data of each device [bytes]."""
     starts: Starts | None = None
-    """What begins with them, not to hold data of devices before them."""
+    """Datagram or frame that the devices open; None where their data follow in the datagram before."""
 
 
 class Packing(NamedTuple):
-    """The frames of process data of a cycle. The numbers may be of any sort."""
+    """Frames of the process data of a cycle; floats, arrays or traced numbers."""
 
     frames: Number
-    """Number of frames [1]."""
     datagrams_bytes: Number
     """Datagrams of all frames, headers and data [bytes]."""
     padding_bytes: Number
@@ -67,30 +66,20 @@ class Packing(NamedTuple):
     last_bytes: Number
     """Datagrams of the last frame [bytes]."""
     before_bytes: Number
-    """Datagrams of the frame before it; 0 where there is none [bytes]."""
+    """Datagrams of the last frame but one [bytes]; 0 where there is none."""
 
     @property
     def wire_bytes(self) -> Number:
-        """All frames on the wire [bytes]."""
+        """Bytes of all frames on the wire [bytes]."""
         return self.frames * overhead_bytes() + self.datagrams_bytes + self.padding_bytes
 
 
 def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> Packing:
-    """Pack devices into frames, in their order.
+    """Frames into which the devices fit, in the order of the segment.
 
-    Parameters
-    ----------
-    devices
-        Groups of devices in their order, at least one.
-    datagrams
-        Datagrams of process data in a frame that holds any: 1 for LRW, 2 for LRD and LWR [1].
-    first_bytes
-        The master's own datagrams, which open the first frame; 0 for none [bytes].
-
-    Returns
-    -------
-    Packing
-        A device too large for a frame counts as one frame: a limit is broken then.
+    `devices` has at least one group. `datagrams` of process data are in each frame that holds any: 1 for LRW, 2 for LRD
+    and LWR [1]. `first_bytes` are the master's own datagrams, which open the first frame [bytes]. A device too large
+    for a frame counts as one frame; a limit is broken then.
 
     Examples
     --------
@@ -100,19 +89,19 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
     headers = total([c.DATAGRAM_BYTES] * datagrams)
-    free: Number = 0.0  # bytes for data in the open frame, which is the last so far
+    free: Number = 0.0  # Bytes for data in the open frame, which is the last so far.
     frames: Number = 0
     last: Number = 0.0
     datagrams_bytes: Number = first_bytes
     padding: Number = 0.0
     before: Number = 0.0
-    behind: Number = 0  # devices so far
+    behind: Number = 0  # Devices so far.
     if not is_off(first_bytes):
         # The master's datagrams go alone where the first device has no room after them.
         has_room = room - first_bytes - _first_device_bytes(devices) >= 0
         free = choose(has_room, room - first_bytes, 0.0)
         follows, is_filled = choose(has_room, headers, 0.0), total(group.number for group in devices) > 0
-        # Without process data the master's datagrams go alone, without a header of it.
+        # Without process data the master's datagrams go alone, without a header for data.
         last = first_bytes + (follows if is_everywhere(is_filled) else choose(is_filled, follows, 0.0))
         datagrams_bytes = last
         frames = 1
@@ -139,7 +128,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
 
 
 def _with_data(devices: Devices) -> Devices:
-    """The same devices; points of an array without data, which are in no frame, become 0 devices of 1 byte."""
+    """Devices that have data: array points without data, which are in no frame, become 0 devices of 1 byte."""
     if is_everywhere(devices.data_bytes > 0):
         return devices
     number = choose(devices.data_bytes > 0, devices.number, 0)
@@ -147,7 +136,7 @@ def _with_data(devices: Devices) -> Devices:
 
 
 def _first_device_bytes(devices: Sequence[Devices]) -> Number:
-    """Data of the first device [bytes]; of an array, points may have empty first groups."""
+    """Data of the first device with data [bytes]; in an array, the first groups of a point may be empty."""
     first: Number = devices[-1].data_bytes
     for group in reversed(devices[:-1]):
         is_there = group.number > 0
@@ -156,32 +145,25 @@ def _first_device_bytes(devices: Sequence[Devices]) -> Number:
 
 
 class FrameRun(NamedTuple):
-    """Equal frames in sequence, each with the same number of devices; of plain numbers."""
+    """Equal frames in sequence, each with the same number of devices, in plain numbers."""
 
     first: int
-    """First device in the first frame, from 1."""
+    """Number of the first device in the first frame, from 1."""
     devices: int
     """Devices in each frame; 0 where only the master's own datagrams had room."""
     datagrams_bytes: float
     """Datagrams of each frame [bytes]."""
     frames: int = 1
-    """Number of frames [1]."""
 
     def by_frame(self) -> Iterator[range]:
-        """Numbers of the devices in each frame."""
+        """Device numbers in each frame."""
         for frame in range(self.frames):
             first = self.first + frame * self.devices
             yield range(first, first + self.devices)
 
 
 def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[FrameRun]:
-    """The frames that `pack` counts, in their order: a few runs for a group of any size; of plain numbers.
-
-    Parameters
-    ----------
-    devices, datagrams, first_bytes
-        As `pack` takes them.
-    """
+    """Frames that `pack` counts, in their order and in plain numbers: a few runs for a group of any size."""
     room, headers = room_bytes(datagrams), datagrams * float(c.DATAGRAM_BYTES)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
@@ -209,46 +191,42 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
 
 
 MOST_CYCLES: Final = 1000
-"""Longest hyperperiod that is computed [1]."""
+"""Longest hyperperiod that is computed [cycles]."""
 
 
 class Unit(NamedTuple):
-    """The devices of a group, as a unit whose process data are in every n-th cycle; of plain numbers."""
+    """Devices of a group whose process data are in every n-th cycle, in plain numbers."""
 
     every: int
-    """n [1]."""
+    """Distance n of the cycles with the unit's data [cycles]."""
     devices: int
     data_bytes: float
     """Process data of each device [bytes]."""
     starts: Starts | None = None
 
     def present(self, *, is_due: bool) -> Devices:
-        """Its devices in a cycle, without data where it is not due."""
+        """Devices of the unit in a cycle; they have no data where the unit is not due."""
         return Devices(self.devices, self.data_bytes * is_due, self.starts)
 
 
 class UnitCycle(NamedTuple):
-    """Cycles of the hyperperiod with the same units in them; of plain numbers."""
+    """Cycles of the hyperperiod that have the same units, in plain numbers."""
 
     due: tuple[bool, ...]
-    """Whether each unit is in them."""
+    """Whether each unit is in these cycles."""
     numbers: tuple[int, ...]
-    """Their numbers, from 1."""
+    """Cycle numbers, from 1."""
     wire_bytes: float
     """All frames of process data on the wire [bytes]."""
     last_bytes: float
     """Datagrams of the last frame [bytes]."""
     data_bytes: float
-    """All process data [bytes]."""
 
 
 def checked_hyperperiod(rates: Sequence[int]) -> int:
-    """Cycles after which all units repeat [1].
+    """Number of cycles after which all units repeat [1].
 
-    Raises
-    ------
-    BusplanError
-        More than `MOST_CYCLES`.
+    Raises `BusplanError` where it exceeds `MOST_CYCLES`.
     """
     cycles = lcm(*rates)
     if cycles > MOST_CYCLES:
@@ -258,10 +236,10 @@ def checked_hyperperiod(rates: Sequence[int]) -> int:
 
 
 def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
-    """The rate of each unit with its first cycle.
+    """Rate and first cycle of each unit.
 
-    Spread: units are placed fastest first, then largest first, each at the start that leaves the fullest of its cycles
-    with the fewest bytes so far. Together: all start in cycle 1.
+    Spread: units are placed fastest first, then largest first, each at the start where the fullest of its cycles has
+    the fewest bytes so far. Together: all start in cycle 1.
 
     Examples
     --------
@@ -285,21 +263,10 @@ def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
 def unit_cycles(
     units: tuple[Unit, ...], *, is_spread: bool, datagrams: int, first_bytes: float
 ) -> tuple[UnitCycle, ...]:
-    """The distinct cycles of the hyperperiod, the fullest first.
+    """Distinct cycles of the hyperperiod, the fullest first; the units are in the order of the segment.
 
-    Parameters
-    ----------
-    units
-        In the order of the segment.
-    is_spread
-        Whether slower units are spread over the cycles as evenly as possible; otherwise they share a cycle.
-    datagrams, first_bytes
-        As `pack` takes them.
-
-    Raises
-    ------
-    BusplanError
-        The hyperperiod is longer than `MOST_CYCLES`.
+    `is_spread` spreads slower units over the cycles as evenly as possible; otherwise they share a cycle. Raises
+    `BusplanError` where the hyperperiod exceeds `MOST_CYCLES`.
     """
     cycles = []
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
@@ -317,35 +284,35 @@ def layout(network: Network) -> ProcessData:
 
 
 def datagrams(network: Network) -> int:
-    """Datagrams of process data in a frame: LRW, or LRD and LWR."""
+    """Number of datagrams of process data in a frame [1]: one LRW, or an LRD and an LWR."""
     return 2 if layout(network) == SPLIT else 1
 
 
 def data_bytes(group: Group, network: Network) -> Number:
-    """Process data of a device: the larger of input and output where they share bytes, else their sum [bytes]."""
+    """Process data of a device [bytes]: the larger of inputs and outputs where they share bytes, else their sum."""
     both = group.read_bytes, group.write_bytes
     size_bytes = larger(*both) if layout(network) == SHARED else total(both)
     return named(size_bytes, "device_bytes", f"d{group.name and f',{group.name}'}")
 
 
 def has_rates(network: Network) -> bool:
-    """Whether the data of a group are not in every cycle."""
+    """Whether the data of some group are not in every cycle."""
     return any(group.is_slower for group in network.groups)
 
 
 def rates(network: Network) -> tuple[Rate, ...]:
-    """The rate of each group with its first cycle; of plain numbers."""
+    """Rate and first cycle of each group, in plain numbers."""
     units, _ = _units(network, _cycle_inputs(network, _all_devices(network)))
     return unit_rates(units, is_spread=network.profile.bus.units == "spread")
 
 
 def cycles_of(network: Network) -> tuple[UnitCycle, ...]:
-    """The distinct cycles of the hyperperiod, the fullest first; of plain numbers."""
+    """Distinct cycles of the hyperperiod, the fullest first, in plain numbers."""
     return _cycles(network, _cycle_inputs(network, _all_devices(network)))
 
 
 def devices(network: Network) -> tuple[Devices, ...]:
-    """All devices in their order, with their data in the fullest cycle: 0 for those that are not in it."""
+    """All devices in their order, with their data in the fullest cycle; 0 for devices that are not in it."""
     whole = _all_devices(network)
     if not has_rates(network):
         return whole
@@ -362,7 +329,7 @@ def devices(network: Network) -> tuple[Devices, ...]:
 
 
 def devices_at(network: Network, number: int) -> tuple[Devices, ...]:
-    """All devices in their order, with their data in a cycle of the hyperperiod, from 1; of plain numbers."""
+    """All devices in their order, with their data in cycle `number` of the hyperperiod, from 1; in plain numbers."""
     return tuple(
         group if rate.is_due(number) else group._replace(data_bytes=0)
         for group, rate in zip(_all_devices(network), rates(network), strict=True)
@@ -370,7 +337,7 @@ def devices_at(network: Network, number: int) -> tuple[Devices, ...]:
 
 
 def mean_wire_bytes(network: Network, *, with_reception: Number) -> Number:
-    """Frames of process data of the mean cycle; with reception, the last frame of each cycle counts twice [bytes]."""
+    """Frames of process data of the mean cycle [bytes]; `with_reception` counts the last frame of each cycle twice."""
 
     def at_point(with_reception: float, *numbers: float) -> float:
         sum_bytes = cycles = 0.0
@@ -386,16 +353,9 @@ def mean_wire_bytes(network: Network, *, with_reception: Number) -> Number:
 
 
 def moves_us(network: Network, group: int) -> Number:
-    """How far the ends of a device's frame lie apart over the cycles with its data, the most of any of a group [us].
+    """Range of the end times of a device's frame over the cycles with its data, the largest of group `group` [us].
 
     Frames start at the same time in each cycle; units that are not in every cycle make them longer.
-
-    Parameters
-    ----------
-    network
-        The network.
-    group
-        Index of the group.
     """
     if not has_rates(network):
         return 0.0
@@ -409,7 +369,7 @@ def moves_us(network: Network, group: int) -> Number:
         ]
         first = sum(unit.devices for unit in units[:group]) + 1
         devices = range(first, first + units[group].devices)
-        # Only at the first device of a frame another end begins.
+        # The end changes only at the first device of a frame.
         starts = {device + 1 for ends in cycles for device, _ in ends if device + 1 in devices}
         moved_bytes = 0.0
         for device in starts.union(devices[:1]):
@@ -424,7 +384,7 @@ def moves_us(network: Network, group: int) -> Number:
 def _frame_ends(
     network: Network, units: Sequence[Unit], due: Sequence[bool], first_bytes: float
 ) -> list[tuple[int, float]]:
-    """The last device of each frame of a cycle, and what is on the wire by its end [bytes]; of plain numbers."""
+    """Last device of each frame of a cycle, and bytes on the wire by the end of the frame [bytes]; in plain numbers."""
     present = [unit.present(is_due=is_due) for unit, is_due in zip(units, due, strict=True)]
     ends, sent_bytes = [], 0.0
     for run in frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes):
@@ -435,24 +395,24 @@ def _frame_ends(
 
 
 def _all_devices(network: Network) -> tuple[Devices, ...]:
-    """All devices in their order, whatever their rate."""
+    """All devices in their order, with their data, in this cycle or not."""
     return tuple(Devices(group.nodes, data_bytes(group, network), _starts(group)) for group in network.groups)
 
 
 def _starts(group: Group) -> Starts | None:
-    """What begins with a group; the devices of [node] are alone."""
+    """Datagram or frame that a group opens; None where it follows in the datagram before, and for [node]."""
     starts: Starts | None = getattr(group.node, "starts", None)
     return starts
 
 
 def _cycle_inputs(network: Network, whole: Sequence[Devices]) -> tuple[Number, ...]:
-    """Inputs of the cycles, flat for `pointwise`: the master's datagrams; rate, devices and bytes of each group."""
+    """Flat inputs of the cycles for `pointwise`: the master's datagrams; rate, devices and bytes of each group."""
     units = ((group.every, *devices[:2]) for group, devices in zip(network.groups, whole, strict=True))
     return (housekeeping_bytes(network), *chain.from_iterable(units))
 
 
 def _units(network: Network, numbers: Iterable[float]) -> tuple[tuple[Unit, ...], float]:
-    """The units, and the master's own datagrams [bytes], from the flat inputs of `_cycle_inputs`."""
+    """Units, and the master's own datagrams [bytes], from the flat inputs of `_cycle_inputs`."""
     first_bytes, *of_units = numbers
     columns = zip(of_units[::3], of_units[1::3], of_units[2::3], map(_starts, network.groups), strict=True)
     units = (Unit(int(every), int(nodes), data_bytes, starts) for every, nodes, data_bytes, starts in columns)
@@ -460,7 +420,7 @@ def _units(network: Network, numbers: Iterable[float]) -> tuple[tuple[Unit, ...]
 
 
 def _cycles(network: Network, numbers: Iterable[float]) -> tuple[UnitCycle, ...]:
-    """The distinct cycles, from the inputs of `_cycle_inputs`."""
+    """Distinct cycles, from the flat inputs of `_cycle_inputs`."""
     units, first_bytes = _units(network, numbers)
     is_spread = network.profile.bus.units == "spread"
     return unit_cycles(units, is_spread=is_spread, datagrams=datagrams(network), first_bytes=first_bytes)
@@ -485,7 +445,7 @@ def housekeeping_bytes(network: Network) -> Number:
 
 
 def packing(network: Network, present: Sequence[Devices]) -> Packing:
-    """The frames of process data of some devices."""
+    """Frames of process data of the devices in `present`."""
     packed = pack(present, datagrams=datagrams(network), first_bytes=housekeeping_bytes(network))
     return packed._replace(
         frames=named(packed.frames, "frames", "F"),
@@ -495,19 +455,19 @@ def packing(network: Network, present: Sequence[Devices]) -> Packing:
 
 
 def frames(network: Network, present: Sequence[Devices]) -> tuple[FrameRun, ...]:
-    """The same frames in their order; of plain numbers."""
+    """Frames of `packing` in their order, in plain numbers."""
     first_bytes = housekeeping_bytes(network)
     return tuple(frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes))
 
 
 @step("sending", "sending_us")
 def process_us(network: Network, present: Sequence[Devices]) -> Number:
-    """Time of the frames of process data of some devices on the wire [us]."""
+    """Time on the wire of the frames of process data of some devices [us]."""
     return sending_us(packing(network, present).wire_bytes)
 
 
 def mailbox_frame_us(network: Network) -> Number:
-    """Time of the frame of a mailbox poll on the wire [us]."""
+    """Time on the wire of the frame of a mailbox poll [us]."""
     return sending_us(frame_bytes(datagram_bytes(network.profile.bus.mailbox_bytes)))
 
 

@@ -1,4 +1,4 @@
-"""EtherCAT, as a kind of bus, with its limits and rules."""
+"""EtherCAT as a kind of bus, with its limits and rules."""
 
 from collections.abc import Iterator, Mapping
 from functools import reduce
@@ -50,33 +50,33 @@ if TYPE_CHECKING:
 
 
 class BeforeSync0(ShareOfPeriod):
-    """A command must be in every device before SYNC0."""
+    """Limit of the command, which must be in every device before SYNC0."""
 
     key = "sync0"
     label = "SYNC0, before which commands must arrive"
     way_out = "a larger bus.sync_shift moves SYNC0 later"
 
     def share(self, network: Network) -> Number:
-        """When SYNC0 comes, as a share of the period [1]."""
+        """Time of SYNC0 as a share of the period [1]."""
         return sync0_share(network)
 
     def value(self, network: Network) -> Number:
-        """Latest time at which the last device has taken its command, bias included; 0 without clocks [us]."""
+        """Latest time at which the last device has taken its command, bias included [us]; 0 without clocks."""
         if not network.profile.bus.distributed_clocks:
             return 0.0
         cycle = EthercatCycle(network, LAST_BYTE)
         return cycle.last_command_us + cycle.bias_us()
 
     def doubt(self, network: Network) -> Number:
-        """Standard uncertainty of that time [us]."""
+        """Standard uncertainty of `value` [us]."""
         return EthercatCycle(network, LAST_BYTE).command_doubt_us if network.profile.bus.distributed_clocks else 0.0
 
     def perhaps(self, network: Network) -> Number:
-        """The master may spend all of its time before the frame, or none [us]."""
+        """The master's time, all or none of which may pass before the frame [us]."""
         return network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0
 
     def words(self, network: Network) -> str:
-        """When the last command comes, and if it is late only where all of bus.master_us is spent before the frame."""
+        """Words for the time of the last command; they tell if only the worst split of bus.master_us makes it late."""
         value_us, doubt_us, most_us = self.value(network), self.uncertainty(network), self.most(network)
         depends = self.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
         where = ", all of bus.master_us before the wire" if depends else ""
@@ -84,14 +84,14 @@ class BeforeSync0(ShareOfPeriod):
 
 
 class SyncWindow(Limit):
-    """A frame must not move farther against SYNC0 than each drive allows."""
+    """Limit of a frame's movement against SYNC0, by the window of each drive."""
 
     key = "sync_window"
     way_out = "measure bus.master_jitter_us, or make it smaller"
     place = "bus.master_jitter_us"
 
     def value(self, network: Network) -> Number:
-        """How far frames may move beyond a drive's window, the most of any group; below 0 inside of it [us]."""
+        """Movement of frames beyond a drive's window, the largest of any group; below 0 inside the window [us]."""
         beyond_us: Number = -inf
         for group, us in _moves_us(network):
             beyond_us = larger(beyond_us, us - group.node.sync_window_us)
@@ -102,11 +102,11 @@ class SyncWindow(Limit):
         return 0
 
     def perhaps(self, network: Network) -> Number:
-        """The jitter that a master may have whose jitter is not given: any [us]."""
+        """Jitter of a master whose jitter is not given, which may be of any size; else 0 [us]."""
         return choose(network.profile.bus.master_jitter_us > 0, 0.0, MAX_TIME_US)
 
     def words(self, network: Network) -> str:
-        """How far frames move at the group that is farthest beyond its window, and the jitter that it allows."""
+        """Words for the frame movement of the group farthest beyond its window, and for the jitter allowed."""
         jitter_us = network.profile.bus.master_jitter_us
         moves = ((group, us, group.node.sync_window_us) for group, us in _moves_us(network))
         group, us, most_us = max(moves, key=lambda move: move[1] - move[2])
@@ -118,7 +118,7 @@ class SyncWindow(Limit):
 
 
 def _moves_us(network: Network) -> Iterator[tuple[Group, Number]]:
-    """Groups whose drives have a window about SYNC0, and how far their frames move against it [us]."""
+    """Groups whose drives have a window about SYNC0, and the movement of their frames against it [us]."""
     for index, group in enumerate(network.groups):
         if network.profile.bus.distributed_clocks and group.node.sync_window_us is not None:
             yield group, network.profile.bus.master_jitter_us + moves_us(network, index)
@@ -148,7 +148,7 @@ LIMITS: Final = (
 
 
 def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A circle test is asked for, but no clock makes the axes act at the same time."""
+    """Problem where a circle test is asked for, but no clock makes the axes act at the same time."""
     profile = subject.profile
     if profile.asks_for_circle and not profile.bus.distributed_clocks:
         yield RuleProblem(
@@ -160,7 +160,7 @@ def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The last command is not shown to be taken before SYNC0, and may take effect cycles later."""
+    """Problem where the last command may come after SYNC0, and so take effect cycles later."""
     figures = subject.deciding
     if BeforeSync0.key not in (*figures.exceeded, *(figures.not_shown or ())):
         return
@@ -249,22 +249,22 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     evidence_data = ("ethercat",)
 
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
-        """The cycle of a network under a timing model."""
+        """Cycle of a network under a timing model."""
         return EthercatCycle(network, model)
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose latency it is, and what the master and the clocks add."""
+        """Words for the way that the latency covers, and for what the master and the clocks add."""
         bus = network.profile.bus
         clocks = f"SYNC0 at {bus.sync_shift:.0%} of the period" if bus.distributed_clocks else "no distributed clocks"
         cycles = f"{plural(bus.pipeline_cycles, 'cycle')} in the master"
         return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
-        """Execution counts in latencies only: no device delays a frame for it."""
+        """Whether execution counts: in latencies only, for no device delays a frame."""
         return of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """A plan may shift SYNC0 to a later time, for commands that come after it."""
+        """Setting of a later SYNC0, for commands that would come after it."""
         bus = network.profile.bus
         if not (bus.distributed_clocks and bus.sync_shift):
             return ()
@@ -272,7 +272,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return (Setting("sync_shift", "shift of SYNC0", Cost.REGISTER, ("bus.sync_shift",), tuple(later)),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """One mailbox poll more, a slower master, separate inputs and outputs, and distributed clocks."""
+        """Perturbations: one more mailbox poll, a slower master, separate inputs and outputs, distributed clocks."""
         bus: Any = network.profile.bus
         return (
             Perturbation("one mailbox poll more", {"bus.mailbox_polls": bus.mailbox_polls + 1}),
@@ -294,12 +294,12 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Whole bytes, up to what a frame holds."""
+        """Payloads in whole bytes, up to what a frame holds."""
         each = 1 if layout(network) == SHARED else 2
         return PayloadRange(1, int(room_bytes(datagrams(network)) / each), carrier="a frame")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """The layout of process data, the frames, and the clocks."""
+        """Words for the layout of process data, the frames, and the clocks."""
         count = int(self.cycle(network, model=LAST_BYTE).packing.frames)
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
         return (layout(network), f"{plural(count, 'frame')}", *clocks)
@@ -307,10 +307,10 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     def recorded(
         self, network: Network, path: "Path", *, share: float, channel: str | None, progress: Progress
     ) -> Recorded:
-        """Compare a capture of the master's port with the plan."""
+        """Comparison of a capture of the master's port with the plan."""
         if channel is not None:
             raise BusplanError(f"channel {channel}: a capture of EtherCAT is of one port; only CAN logs have channels")
-        from busplan.buses.ethercat.recorded import recorded  # a single command asks for it, and numpy loads
+        from busplan.buses.ethercat.recorded import recorded  # Only one command needs it, and it loads numpy.
 
         return recorded(network, path, share=share, progress=progress)
 

@@ -18,7 +18,7 @@ _PORTS_OF_LINE: Final = 2
 
 
 class _NoLineError(Exception):
-    """The port receive times do not belong to a line; the text says why."""
+    """The port receive times do not belong to a line; the text gives the reason."""
 
 
 class LineDelays(NamedTuple):
@@ -27,14 +27,14 @@ class LineDelays(NamedTuple):
     hops_us: tuple[float, ...]
     """Delay one way of each device from the second on [us]."""
     latches: int
-    """Number of broadcast writes that the delays are the mean of [1]."""
+    """Number of broadcast writes that the delays are a mean over [1]."""
     remarks: tuple[str, ...]
-    """What the port receive times do not show, and why."""
+    """Sentences on delays that the port receive times do not show, and why."""
 
     def figures(self, network: Network) -> Iterator[RecordedFigure]:
-        """The recorded delay of each device, and the mean of each group of the plan.
+        """Recorded delay of each device, and mean of each group of the plan.
 
-        The plan gives means, so only means have a verdict; none has if the plan has another number of devices.
+        The plan gives means, so only means have a verdict; none has one if the plan has another number of devices.
         """
         groups = self._groups(network)
         if not groups:
@@ -56,7 +56,7 @@ class LineDelays(NamedTuple):
         return edits
 
     def more_us(self, network: Network) -> float:
-        """Delay of the devices there and back with the values of `edits`, less that of the plan [us]."""
+        """Change of the devices' delay there and back when the plan takes the values of `edits` [us]."""
         edits = self.edits(network)
         more_us: float = sum(
             2 * nodes.nodes * (edits[key] - _planned_us(nodes))
@@ -66,7 +66,7 @@ class LineDelays(NamedTuple):
         return more_us
 
     def _groups(self, network: Network) -> list[tuple[ProfileGroup, range]]:
-        """Each group of the plan with the numbers of its devices, from 2: port receive times show no delay of device 1.
+        """Groups of the plan with their device numbers, from 2: port receive times show no delay of device 1.
 
         Empty where the plan has another number of devices.
         """
@@ -80,7 +80,7 @@ class LineDelays(NamedTuple):
         return sum(self.hops_us[number - 2] for number in numbers) / len(numbers)
 
     def _figure(self, numbers: range, nodes: ProfileGroup | None = None) -> RecordedFigure:
-        """Mean delay of some devices, with that of their group in the plan."""
+        """Mean delay of some devices, with the planned delay of their group."""
         name = f"delay of device {numbers[0]}"
         if len(numbers) > 1:
             name = f"mean delay of devices {numbers[0]} to {numbers[-1]}"
@@ -112,15 +112,10 @@ class LineDelays(NamedTuple):
 def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
     """Delays of the devices in a line, from port receive times.
 
-    A frame passes a device, all those after it, and the device again: half the difference of its two port times, less
-    that of the next device, is the delay one way. The difference falls from device to device: this gives their order.
-
-    Parameters
-    ----------
-    latches
-        The broadcast writes, each with the port receive times read after it.
-    unlatched
-        Number of reads of port receive times without such a write before.
+    A frame passes a device, all those after it, and the device again. Half the difference of the device's two port
+    times, less that of the next device, is its delay one way. The difference falls from device to device, which gives
+    their order. `latches` are the broadcast writes, each with the port receive times read after it; `unlatched` counts
+    the reads without such a write before them.
 
     References
     ----------
@@ -149,12 +144,9 @@ def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
 
 
 def _spans_ns(latch: Latch) -> list[int]:
-    """From the first to the last port receive time of each device in a line, in their order [ns].
+    """Time from the first to the last port receive time of each device, in the order of the line [ns].
 
-    Raises
-    ------
-    _NoLineError
-        The devices are not in a line.
+    Raises `_NoLineError` where the devices are not in a line.
     """
     read = len(latch.ports_ns)
     if read != latch.devices:
@@ -184,11 +176,11 @@ def _span_ns(times_ns: Mapping[int, int]) -> int:
 
 
 def _planned_us(nodes: ProfileGroup) -> float:
-    """Delay of a device one way as planned [us]."""
+    """Planned delay of a device one way [us]."""
     delay_us = nodes.node.delay_us
     return float(c.by_key("DELAY_US")[nodes.node.port]) if delay_us is None else delay_us
 
 
 def _cable_us(nodes: ProfileGroup) -> float:
-    """Cable to a device one way [us]."""
+    """Delay of the cable to a device one way [us]."""
     return cable_us(nodes.node.cable_length_m) / 2

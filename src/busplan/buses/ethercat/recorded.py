@@ -1,4 +1,4 @@
-"""A capture of the master's port compared with the plan: period, jitter, round trips, bytes, and lost frames."""
+"""Capture of the master's port compared with the plan: period, jitter, round trips, bytes, and lost frames."""
 
 from collections.abc import Iterator, Sequence
 from math import ceil
@@ -39,23 +39,23 @@ _MASTER: Final = "bus.master_us"
 _JITTER: Final = "bus.master_jitter_us"
 _MISSED: Final = "limits.missed_cycles"
 _STEP_BACK_NS: Final = 50_000
-"""A stamp further before its predecessor means that the clock was set back; less may be two capture queues [ns]."""
+"""Least step back of a stamp that means a clock set back; a smaller step may come from two capture queues [ns]."""
 _TWO_STAMPS: Final = 0.5
-"""Standard uncertainty of the longest of many differences of two stamps, in steps: their error is a step at most."""
+"""Standard uncertainty, in steps of the stamps, of the longest of many differences; its error is one step at most."""
 _LEAST_SPAN_BYTES: Final = 200
-"""Least range of frame sizes that shows the time of a byte: the host's time depends on the size, too [bytes]."""
+"""Least range of frame sizes that shows the time of a byte; the host's time depends on the size, too [bytes]."""
 _BITS: Final = 8
 """Bits of a byte."""
 _STRAY: Final = 0.01
-"""Share of the frames that may have a wrong stamp or a wrong partner."""
+"""Share of frames that may have a wrong stamp or a wrong partner."""
 
 
 class _Trips(NamedTuple):
-    """Frames paired with their return: indexes into the recording."""
+    """Frames paired with their return, as indexes into the recording."""
 
     sent: Ints
     returned: Ints
-    """The same frames on their return."""
+    """Returned frame of each pair."""
     lost: Ints
     """Frames that did not return."""
     unsent: int
@@ -70,33 +70,20 @@ class _CycleValues(NamedTuple):
     is_back: npt.NDArray[np.bool_]
     """Whether all frames returned."""
     trips_us: Floats
-    """Round trip: from the first frame sent to the last one returned [us]."""
+    """Round trip, from the first frame sent to the last one returned [us]."""
     host_us: Floats
-    """Round trip less wire, bias of the bytes, and devices and cables of the plan: the master's own time [us]."""
+    """The master's own time: round trip less wire, bias of the bytes, and planned devices and cables [us]."""
     data_bytes: npt.NDArray[Any]
-    """Process data [bytes]."""
     datagrams_bytes: npt.NDArray[Any]
     """All datagrams [bytes]."""
 
 
 def recorded(network: Network, path: Path, *, share: float, progress: Progress) -> Recorded:
-    """Compare a capture with the plan.
+    """Comparison of a capture at the master's port, a pcap or pcapng file, with the plan.
 
-    Parameters
-    ----------
-    network
-        The plan, of plain numbers.
-    path
-        A pcap or pcapng file, recorded at the master's port.
-    share
-        Quantile of the cycles for jitter and the master's time, 0.5..1.
-    progress
-        Called with the bytes read and the size of the file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        The file is no capture, or has no EtherCAT frames that can be compared.
+    `network` has plain numbers. `share` is the quantile of cycles for jitter and the master's time, 0.5..1. `progress`
+    is called with the bytes read and the size of the file [bytes]. Raises `BusplanError` where the file is no capture,
+    or has no EtherCAT frames that can be compared.
     """
     frames = read_ethercat(path, progress=progress)
     if not frames.returned.any():
@@ -122,7 +109,7 @@ class _Seen:
         self.trips_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
         self.delays = line_delays(frames.latches, frames.unlatched)
         self.dropped = frames.notes.dropped + frames.cut
-        """Number of packets that the recorder says it dropped, or that it cut."""
+        """Number of packets that the recorder reports as dropped, or that it cut."""
         self.own_reads = _own_reads(network, frames.layouts)
         """Datagrams of the master itself that have a logical address."""
         process = [tuple(filter(self._is_process_data, layout)) for layout in frames.layouts]
@@ -134,7 +121,7 @@ class _Seen:
         self.cycles: SeenCycles | None = None
         sent = np.flatnonzero(self.is_data & ~frames.returned)
         if len(sent):
-            # Where the clock was set back, only the longest stretch between counts.
+            # Where the clock was set back, only the longest stretch between such steps counts.
             stretch = np.concatenate(([0], np.cumsum(steps_back)))[sent]
             sent = sent[stretch == np.bincount(stretch).argmax()]
             sent = sent[np.argsort(frames.times_ns[sent], kind="stable")]
@@ -143,7 +130,7 @@ class _Seen:
             kinds = np.array([numbers[parts] for parts in process])[frames.layout[sent]]
             self.cycles = seen_cycles(sent, times_us, kinds, self.data_bytes[sent], network)
         self.bad_stamps = self._why_bad_stamps()
-        """Why durations cannot be taken from the stamps; empty where they can."""
+        """Reason why stamps give no durations; empty where they do."""
         self.jitter: Quantile | None = None
         self.master: Quantile | None = None
         self.master_bytes: list[int] | None = None
@@ -176,13 +163,13 @@ class _Seen:
 
     @property
     def too_few(self) -> str:
-        """Why the recording has too few cycles for a period; empty where it has enough, or stamps in bursts."""
+        """Reason why the recording has too few cycles for a period; empty where it has enough, or stamps in bursts."""
         if self.cycles is None or self.cycles.periods is not None or self.cycles.in_bursts:
             return ""
         return f"{plural(len(self.cycles.first), 'cycle')}, and a period takes {LEAST_EVENTS}"
 
     def shows_nothing(self) -> tuple[str, ...]:
-        """Why the recording cannot show that the machine keeps its plan."""
+        """Reasons why the recording cannot show that the machine keeps its plan."""
         reasons = (
             "" if self.cycles else "it has no frame of process data (LRD, LWR, LRW)",
             self.too_few and f"it has {self.too_few}",
@@ -196,7 +183,7 @@ class _Seen:
         return f"the recorder dropped or cut {plural(self.dropped, 'packet')}" if self.dropped else ""
 
     def figures(self) -> Iterator[RecordedFigure]:
-        """All figures."""
+        """All recorded figures."""
         if self.cycles is not None:
             yield from self._period(self.cycles)
             yield from self._cycles(self.cycles)
@@ -205,7 +192,7 @@ class _Seen:
         yield from self.delays.figures(self.network)
 
     def _period(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
-        """Period, and latest start of a cycle."""
+        """Figures of the period and of the latest start of a cycle."""
         periods, count = cycles.periods, len(cycles.first)
         period_us, jitter_us = self.network.period_us, self.network.profile.bus.master_jitter_us
         period = RecordedFigure("period", "us", period_us, None, None, "equal", count, _PERIOD)
@@ -229,7 +216,7 @@ class _Seen:
         )
 
     def _cycles(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
-        """Missing cycles, then times and layout of each kind of cycle."""
+        """Figures of missing cycles, then of the times and layout of each kind of cycle."""
         per_cycle = self._values(cycles)
         if cycles.periods is None:
             yield from self._times(cycles.sorts[0], "", per_cycle.trips_us, (per_cycle.host_us,))
@@ -267,7 +254,7 @@ class _Seen:
         return _CycleValues(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
 
     def _without_frame(self, cycles: SeenCycles, with_less: int) -> RecordedFigure:
-        """Cycles without a frame, or with less in their frames than most cycles of their kind."""
+        """Figure of cycles without a frame, or with less in their frames than most cycles of their kind."""
         longest, missing = int(cycles.gaps.max(initial=0)), int(cycles.gaps.sum())
         notes = []
         if longest > 1:
@@ -281,7 +268,7 @@ class _Seen:
         return self._missed("cycles without a frame", missing + with_less, events, ", ".join(notes), self._dropped)
 
     def _missed(self, quantity: str, number: int, events: int, note: str, hides: str = "") -> RecordedFigure:
-        """A number that counts against `limits.missed_cycles`; hidden where dropped packets may explain the excess."""
+        """A count held against `limits.missed_cycles`; hidden where dropped packets may explain the excess."""
         limit = self.network.profile.limits.missed_cycles
         hidden = hides if number - self.dropped <= limit else ""
         return RecordedFigure(quantity, "1", limit, number, None, "at most", events, _MISSED, note, hidden=hidden)
@@ -335,7 +322,7 @@ class _Seen:
             yield RecordedFigure(name, "1", planned.frames, frames, None, "equal", count, hidden=hidden)
         if not count:
             return
-        # Show the middle one of the most frequent cycles: now and then a master adds a datagram.
+        # The middle one of the most frequent cycles is shown: now and then a master adds a datagram.
         sizes, often = np.unique(per_cycle.datagrams_bytes[of_sort], return_counts=True)
         usual_bytes = sizes[often.argmax()]
         usual = of_sort[per_cycle.datagrams_bytes[of_sort] == usual_bytes]
@@ -359,7 +346,7 @@ class _Seen:
             self.master_bytes = [part.data_bytes for part in added]
 
     def _lost(self) -> Iterator[RecordedFigure]:
-        """Frames that did not return, and frames with a wrong working counter."""
+        """Figures of frames that did not return, and of frames with a wrong working counter."""
         frames, trips = self.frames, self.trips
         sent = int(np.count_nonzero(~frames.returned))
         yield self._missed("lost frames", len(trips.lost), sent, "", self._dropped)
@@ -400,7 +387,7 @@ class _Seen:
         )
 
     def remarks(self) -> Iterator[str]:
-        """Sentences on what else the recording has, and what it does not show."""
+        """Sentences on other contents of the recording, and on what it does not show."""
         frames, notes = self.frames, self.frames.notes
         if notes.broken_at is not None:
             why = f"has more than {MOST_PACKETS:,} packets, and goes on" if notes.is_long else "is cut or damaged"
@@ -449,7 +436,7 @@ class _Seen:
 
 
 def _usual(values: npt.NDArray[Any], sort: Ints) -> npt.NDArray[Any]:
-    """For each of n values, the most frequent value in the same kind of cycle or frame."""
+    """Most frequent value in the same kind of cycle or frame, for each of n values."""
     usual = np.zeros_like(values)
     for number in np.unique(sort):
         distinct, often = np.unique(values[sort == number], return_counts=True)
@@ -463,10 +450,10 @@ def _up(us: float) -> float:
 
 
 def _own_reads(network: Network, layouts: Sequence[tuple[Datagram, ...]]) -> frozenset[Datagram]:
-    """Reads of the master's own with a logical address, as of the state of all mailboxes at TwinCAT.
+    """Reads of the master's own with a logical address, such as TwinCAT's of the state of all mailboxes.
 
-    Such a read (LRD) lies behind process data that bring inputs already, and has a size that the plan gives the
-    master, or at most a bit of each device.
+    Such a read (LRD) follows process data that already bring inputs. Its size is one that the plan gives the master, or
+    at most a bit of each device.
     """
     found: set[Datagram] = set()
     planned: Sequence[int] | None = network.profile.bus.housekeeping_bytes
@@ -484,7 +471,7 @@ def _datagrams_bytes(parts: Sequence[Datagram]) -> float:
 
 
 def _trips(frames: EthercatFrames) -> _Trips:
-    """Pair sent frames with returned ones.
+    """Sent frames paired with returned ones.
 
     Frames keep their order on the ring, so frames with equal datagrams and indexes return in the order in which they
     were sent. If some were sent in a row and fewer returned before the next was sent, the earliest are lost.

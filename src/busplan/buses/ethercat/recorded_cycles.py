@@ -1,4 +1,4 @@
-"""The cycles of a capture: which frames make a cycle, and which cycle of the plan each one is."""
+"""Cycles of a capture: the frames of each cycle, and the cycle of the plan that each one is."""
 
 from math import inf, log
 from typing import Any, Final, NamedTuple
@@ -12,21 +12,21 @@ from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, 
 
 Ints = npt.NDArray[np.int64]
 _JUMP: Final = 1.01
-"""Least ratio of two usual distances of frames between which a bound is tried."""
+"""Smallest ratio of two usual frame distances between which a bound is tried."""
 _FARTHEST: Final = log(8)
 """Largest |log(recorded period / planned period)| at which frames are divided into cycles."""
 _SAME: Final = 0.1
-"""Largest difference of these logarithms at which two periods count as the same."""
+"""Largest difference of these logarithms at which two periods count as equal."""
 _BURST: Final = 1 / 20
-"""Share of the planned period: cycles closer than that mean that frames were stamped in bursts."""
+"""Share of the planned period below which the distance of cycles shows that frames were stamped in bursts."""
 
 
 class PlannedCycles:
-    """The cycles of the hyperperiod (the common multiple of the rates); one cycle if all rates are 1."""
+    """Cycles of the hyperperiod (the common multiple of the rates); one cycle if all rates are 1."""
 
     def __init__(self, network: Network) -> None:
         self.sorts = cycles_of(network)
-        """The distinct cycles, the fullest first."""
+        """Distinct cycles, the fullest first."""
         self.sort = np.zeros(sum(len(sort.numbers) for sort in self.sorts), dtype=np.int64)
         """Index in `sorts` of each cycle."""
         for index, sort in enumerate(self.sorts):
@@ -37,27 +37,23 @@ class PlannedCycles:
         filled = np.flatnonzero(self.data_bytes)
         apart = np.diff(filled, append=filled[:1] + len(self.sort)) if len(filled) else np.ones(1, dtype=np.int64)
         self.apart = np.ones(len(self.sort), dtype=np.int64)
-        """Distance from each cycle with process data to the next, in cycles; 1 for a cycle without."""
+        """Distance from each cycle with process data to the next one, in cycles; 1 for a cycle without."""
         self.apart[filled] = apart[: len(filled)]
         self.least_apart = int(apart.min())
-        """Least distance from a cycle with process data to the next, in cycles."""
+        """Smallest such distance, in cycles."""
         self.least_share = float(np.mean(apart == self.least_apart))
-        """Share of these distances that are as short."""
+        """Share of the distances that equal the smallest."""
 
     def filled_before(self, number: Ints) -> Ints:
-        """Number of cycles with process data before a cycle, from 0; it may be beyond the first hyperperiod."""
+        """Number of cycles with process data before cycle `number`, from 0, in this or a later hyperperiod."""
         whole, rest = np.divmod(number, len(self.sort))
         return np.asarray(whole * self._filled[-1] + self._filled[rest])
 
     def phase(self, places: Ints, data_bytes: npt.NDArray[Any], likely: int = 0) -> int:
-        """The cycle of the hyperperiod that period 0 of a recording is: the one with the best match of process data.
+        """Cycle of the hyperperiod in which the recording begins: the one whose process data match best.
 
-        Parameters
-        ----------
-        places, data_bytes
-            Periods of n cycles in the recording, from 0, and their process data [bytes].
-        likely
-            The cycle that is taken where no other is better.
+        `places` are the periods of n cycles in the recording, from 0, and `data_bytes` their process data [bytes].
+        `likely` is taken where no other cycle matches better.
         """
         count = len(self.sort)
         pairs, often = np.unique(np.stack((places % count, data_bytes), axis=1), axis=0, return_counts=True)
@@ -72,41 +68,36 @@ class SeenCycles(NamedTuple):
     frames: Ints
     """Indexes of all their frames in the recording."""
     number: Ints
-    """Cycle that each frame belongs to, from 0."""
+    """Cycle of each frame, from 0."""
     first: Ints
-    """Indexes of their first frames."""
+    """Index of the first frame of each cycle."""
     periods: PeriodicEvents | None
-    """When they begin; None for too few cycles, or for stamps in bursts."""
+    """Start times of the cycles; None for too few cycles, or for stamps in bursts."""
     in_bursts: bool
     """Whether stamps come in bursts, which have no period."""
     sorts: tuple[UnitCycle, ...]
-    """The distinct cycles of the plan, the fullest first."""
+    """Distinct cycles of the plan, the fullest first."""
     sort: Ints
     """Index in `sorts` of each cycle."""
     gaps: Ints
     """Number of planned cycles with process data that are missing between each cycle and the next."""
     left_out: int
-    """Number of frames left out at the ends: the master starting or stopping, and incomplete cycles."""
+    """Number of frames left out at the ends, where the master starts or stops or a cycle is incomplete."""
 
 
 def seen_cycles(frames: Ints, times_us: Floats, kinds: Ints, data_bytes: Floats, network: Network) -> SeenCycles:
-    """Divide frames into cycles, and find the planned cycle of each from its time and process data.
+    """Cycles that the frames make up, and the planned cycle of each, from its time and process data.
 
-    Parameters
-    ----------
-    frames
-        Indexes of the frames of process data in the recording, in the order of their times, at least one.
-    times_us, kinds, data_bytes
-        Of each: time sent, number of its datagrams of process data (equal ones have the same), process data [bytes].
-    network
-        The plan, of plain numbers.
+    `frames` are the indexes of the frames of process data in the recording, at least one, in the order of their times.
+    Of each frame, `times_us` has the time sent, `kinds` a number for its datagrams of process data (the same for equal
+    ones), and `data_bytes` the process data [bytes]. The network has plain numbers.
     """
     plan = PlannedCycles(network)
     period_us = network.period_us
     starts, near_us = _starts(times_us, kinds, plan, period_us)
     in_bursts = len(starts) > 1 and float(np.median(np.diff(times_us[starts]))) < _BURST * period_us
     begin, end = 0, len(starts)
-    while True:  # until no more cycles have to be left out at the ends
+    while True:  # Until no more cycles have to be left out at the ends.
         kept = slice(int(starts[begin]), int(np.append(starts, len(frames))[end]))
         first = starts[begin:end]
         number = np.searchsorted(first, np.arange(kept.start, kept.stop), side="right") - 1
@@ -157,10 +148,10 @@ def _starts(times_us: Floats, kinds: Ints, plan: PlannedCycles, period_us: float
 
 
 def _numbered(plan: PlannedCycles, places: Ints, data_bytes: npt.NDArray[Any]) -> tuple[Ints, Ints]:
-    """Cycle of the hyperperiod for each recorded one, and the number of those missing after it, with process data.
+    """Cycle of the hyperperiod of each recorded cycle, and number of cycles with process data missing after it.
 
-    The whole recording shows its place in the hyperperiod. A master that skips a period may not skip a number of its
-    own count: where another cycle comes than the next one planned, and data differ, the place is looked for again.
+    The whole recording shows its place in the hyperperiod. A master that skips a period may not skip a number in its
+    own count: where a cycle comes that the plan does not expect next, and its data differ, the place is sought again.
     """
     count, apart = len(plan.sort), np.diff(places)
     some = max(2 * int(np.count_nonzero(plan.data_bytes)), LEAST_EVENTS)
@@ -181,9 +172,9 @@ def _numbered(plan: PlannedCycles, places: Ints, data_bytes: npt.NDArray[Any]) -
 
 
 def _in_operation(gaps: Ints) -> tuple[int, int]:
-    """The first cycle and the end of the last, without those while the master starts or stops.
+    """First cycle and end of the last, without those while the master starts or stops.
 
-    Those lie before the first ten or after the last ten cycles in a row, if more cycles are missing there than present.
+    These lie before the first ten or after the last ten cycles in a row, if more cycles are missing there than present.
     """
     in_a_row = np.convolve(np.append(gaps, 1) == 0, np.ones(LEAST_EVENTS - 1), "full")[LEAST_EVENTS - 2 :]
     rows = np.flatnonzero(in_a_row == LEAST_EVENTS - 1)
@@ -195,12 +186,9 @@ def _in_operation(gaps: Ints) -> tuple[int, int]:
 
 
 def _whole(frames: Ints, sort: Ints) -> tuple[int, int]:
-    """The first cycle and the end of the last, without cycles that the capture has only in part.
+    """First cycle and end of the last, without cycles that the capture has only in part.
 
-    Parameters
-    ----------
-    frames, sort
-        Frames of n cycles, and which cycles of the plan they are.
+    `frames` counts the frames of n cycles, and `sort` tells which cycles of the plan they are.
     """
     has_less = [frames[end] < np.median(frames[sort == sort[end]]) for end in (0, -1)]
     return int(has_less[0]), len(frames) - int(has_less[1])

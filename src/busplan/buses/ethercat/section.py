@@ -1,4 +1,4 @@
-"""The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
+"""Keys of [bus], [node] and [[group]] that only an EtherCAT bus has."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Literal
@@ -136,7 +136,7 @@ class EthercatNode(NodeSection):
 
 
 def _no_time_without_axes(group: dict[str, Any]) -> dict[str, Any] | None:
-    """Default execution of a group: no time for devices without axes; None for others, which must give it."""
+    """Default execution of a group: 0 for devices without axes, None for others, which must give it."""
     if group.get("axes", 1):
         return None
     return {"kind": "linear", "grade": "assumed", "base_us": 0.0, "per_byte_us": 0.0}
@@ -175,7 +175,7 @@ class EthercatGroup(EthercatNode, GroupSection):
             raise refused(Problem(MISSING, kind="missing-key"))
         return value
 
-    # Couplers have no data, and most terminals only inputs or only outputs.
+    # Couplers have no data, and most terminals have inputs only or outputs only.
     may_be_empty: ClassVar[bool] = True
 
 

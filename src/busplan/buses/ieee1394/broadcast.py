@@ -1,9 +1,9 @@
 """The broadcast schedule: a query, a broadcast of each node, a read of the hub that collected them, a write.
 
-It is that of the da Vinci Research Kit (dVRK). A query is a quadlet write to the hub, which all nodes hear. Each
-broadcasts its data without an acknowledge, in the order of the nodes. The hub has all of them in a block, which the
-host reads; the answer is concatenated. One block write, to the hub too, has the commands of all nodes. What goes on the
-bus goes to the farthest node. No execution time is on the bus.
+It is the schedule of the da Vinci Research Kit (dVRK). The query is a quadlet write to the hub, and all nodes hear it.
+Each node then broadcasts its data without an acknowledge, in the order of the nodes. The hub collects them in a block,
+which the host reads; the answer is concatenated. One block write, also to the hub, carries the commands of all nodes.
+Every packet goes to the farthest node. No execution time is on the bus.
 
 References
 ----------
@@ -28,24 +28,12 @@ from busplan.sections.base import TransactionKind
 
 
 def hub_block_bytes(network: Network) -> Number:
-    """Payload of the hub's block: the data of each node after its quadlet of sequence, and one of timing [bytes].
-
-    Parameters
-    ----------
-    network
-        The network; of any sort.
-    """
+    """Payload of the hub's block: a sequence quadlet and the data of each node, and one timing quadlet [bytes]."""
     return total(group.nodes * _with_quadlet(group.read_bytes) for group in network.groups) + c.HUB_TIMING_BYTES
 
 
 def write_block_bytes(network: Network) -> Number:
-    """Payload of the write: the command to each node after its header quadlet [bytes].
-
-    Parameters
-    ----------
-    network
-        The network; of any sort.
-    """
+    """Payload of the write: a header quadlet and the command of each node [bytes]."""
     return total(group.nodes * _with_quadlet(group.write_bytes) for group in network.groups)
 
 
@@ -64,7 +52,7 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     @step("T_query")
     def query_us(self) -> Number:
-        """The query with its acknowledge [us]."""
+        """Time of the query with its acknowledge [us]."""
         data_us = self.delays.data_us(c.QUADLET_WRITE_REQUEST_BYTES)
         return self.delays.arbitration_us + data_us + self.delays.acknowledge_us
 
@@ -78,7 +66,7 @@ class BroadcastCycle(CycleWithStarts):
 
     @cached_property
     def gap_us(self) -> Number:
-        """Idle bus before each broadcast: none for an isochronous request [us]."""
+        """Idle bus before each broadcast [us]; none for an isochronous request."""
         return 0.0 if self._is_isochronous else self.delays.gaps.subaction_us
 
     @cached_property
@@ -90,14 +78,9 @@ class BroadcastCycle(CycleWithStarts):
         return clocks / c.BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
-        """Wait of the next node after the broadcast of a node, where each has its own time [us].
+        """Wait of the next node after a broadcast of the group, where each node has its own time [us].
 
-        With unlike nodes it is the most: a node that is late because of a long broadcast waits less.
-
-        Parameters
-        ----------
-        group
-            The node's group.
+        It is an upper bound for unlike nodes: a node that a long broadcast delays waits less.
         """
         if not self._is_timed:
             return 0.0
@@ -106,13 +89,13 @@ class BroadcastCycle(CycleWithStarts):
 
     @cached_property
     def slot_waits_us(self) -> Number:
-        """Wait of all nodes for their times after the first; nobody waits after the last [us]."""
+        """Wait of all nodes after the first for their own times [us]; no wait follows the last broadcast."""
         groups = self.network.groups
         return total(group.nodes * self.slot_wait_us(group) for group in groups) - self.slot_wait_us(groups[-1])
 
     @cached_property
     def arbitration_us(self) -> Number:
-        """Arbitration of a broadcast: an isochronous request waits for no part of the gap count [us]."""
+        """Arbitration of a broadcast [us]; an isochronous request waits for no part of the gap count."""
         if not self._is_isochronous or not self.link.has_gaps:
             return self.delays.arbitration_us
         return equations.arbitration_phase_us(
@@ -120,13 +103,7 @@ class BroadcastCycle(CycleWithStarts):
         )
 
     def broadcast_us(self, group: Group) -> Number:
-        """Data phase of the broadcast of a node [us].
-
-        Parameters
-        ----------
-        group
-            The node's group.
-        """
+        """Data phase of a broadcast of the group [us]."""
         return self.delays.data_us(c.BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
 
     @property
@@ -137,20 +114,20 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     @step("T_boards")
     def boards_us(self) -> Number:
-        """All broadcasts with their gaps [us]."""
+        """Time of all broadcasts, gaps included [us]."""
         each_us = self.gap_us + self.arbitration_us
         sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
         return self.first_wait_us + sent_us + self.slot_waits_us
 
     @cached_property
     def hub(self) -> Phases:
-        """The read of the hub's block, whose answer is concatenated."""
+        """The read of the hub's block; its answer is concatenated."""
         responder = Responder(0.0, "concatenated", host_us=self.host_us)
         return self._transaction("read", hub_block_bytes(self.network), responder)
 
     @cached_property
     def write(self) -> Phases:
-        """The write of all commands to the hub, which its acknowledge answers."""
+        """The write of all commands to the hub; its acknowledge is the answer."""
         responder = Responder(0.0, "unified", host_us=self.host_us)
         return self._transaction("write", write_block_bytes(self.network), responder)
 
@@ -166,10 +143,10 @@ class BroadcastCycle(CycleWithStarts):
 
     @cached_property
     def hub_wait(self) -> IdleTime:
-        """From the last broadcast to the read of the hub.
+        """Idle bus from the last broadcast to the read of the hub.
 
-        The host waits 10 + 5 N us after the query, and knows nothing of the broadcasts. Its own time follows that, or
-        the last broadcast if it is later.
+        The host waits 10 + 5 N us after the query and does not watch the broadcasts. Its own time follows that wait, or
+        the last broadcast if it ends later.
         """
         return self._idle(self.late_us + self.host_us)
 
@@ -179,7 +156,7 @@ class BroadcastCycle(CycleWithStarts):
 
     @property
     def host_us(self) -> Number:
-        """The host's own time before each of its requests [us]."""
+        """The host's own time before all its requests [us]."""
         host_us: Number = self.network.profile.host.transaction_us
         return host_us
 
@@ -231,17 +208,17 @@ class BroadcastCycle(CycleWithStarts):
         )
 
     def all_us(self, kind: TransactionKind) -> Number:
-        """The broadcasts of all nodes and the read of the hub; or the write of all commands [us]."""
+        """Time of the nodes' broadcasts and the read of the hub, or of the write of all commands [us]."""
         if kind == "write":
             return self.write.transaction_us
         return self.boards_us + self.hub_wait.us + self.hub.transaction_us
 
     def longest(self, kind: TransactionKind) -> Phases:
-        """The read of all data, or the write of all commands [us]."""
+        """Phases of the read of all data, or of the write of all commands [us]."""
         return self.read if kind == "read" else self.write
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """The data of a node to the host, and a command to it; they are those of all nodes."""
+        """Latencies of data to the host and of commands to the nodes; they are the same for all nodes."""
         link = {"hops": self.link.hops, "gap_count": self.link.gap_count}
         before_hub = {"query_us": self.query_us, "boards_us": self.boards_us, "hub_wait_us": self.hub_wait.us}
         read = {**link, **before_hub, **self.read._asdict(), "all_us": self.reads_us}
@@ -256,16 +233,16 @@ class BroadcastCycle(CycleWithStarts):
         )
 
     def bias_us(self) -> Number | None:
-        """Time of the packets beyond the model, on the mean [us]."""
+        """Mean time of the packets beyond the model [us]."""
         if not self.link.has_gaps:
             return 0.0
         with_gap_us = self.with_gap * doubts.gap_term_us(self.link.gap_count)
         return self.halves * doubts.residual().mean_us + with_gap_us
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """Inputs that are not known exactly."""
+        """Doubt of each input that is not known exactly."""
         retries, nodes = self.network.profile.cycle.retries, self.network.nodes
-        # Of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
+        # PHY delays of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
         hop_delays = 3 + 2 * nodes + 5 + 3 + 3 * retries + 2 * self.number_of_starts
         return doubts.of_inputs(
             residual_us=self.halves * doubts.residual().uncertainty_us,
@@ -278,7 +255,7 @@ class BroadcastCycle(CycleWithStarts):
     @property
     @step("halves")
     def halves(self) -> Number:
-        """Packets: the query, each broadcast, two of the hub, the write, and retries [1]."""
+        """Packets of the cycle: the query, each broadcast, two of the hub, the write, and retries [1]."""
         return self.network.nodes + 4 + self.network.profile.cycle.retries
 
     @property
@@ -287,7 +264,7 @@ class BroadcastCycle(CycleWithStarts):
         return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
 
     def _host_swing_us(self) -> Number:
-        """Change by a standard uncertainty of the host [us]."""
+        """Change of the cycle by a standard uncertainty of the host's time [us]."""
         step_us: Number = self.network.profile.host.standard_uncertainty_us
         if is_off(step_us):
             return 0.0
@@ -304,7 +281,7 @@ def _part(transaction: str, packet: str, kind: str, term: str, us: Number, label
 
 
 def _waits(idle: IdleTime, where: str) -> tuple[BusEvent, BusEvent]:
-    """Idle bus before a request, as events."""
+    """Events of the idle bus before a request."""
     host = f"host's own time {where}"
     return (
         BusEvent("arbitration_reset_gap", "cycle_idle_us", idle.idle_us, f"arbitration reset gap {where}"),

@@ -1,7 +1,7 @@
 """Constants of IEEE 1394: rates, limits, packet sizes, gap counts and the constants of the equations.
 
-`constants.toml` has the unit, the source and the grade of every figure that somebody published or measured. What is so
-by definition (the bits of a byte, a field of six bits) is a plain number here.
+`constants.toml` has unit, source and grade of every figure that somebody published or measured. What holds by
+definition (bits of a byte, a field of six bits) is a plain number here.
 """
 
 from typing import Final, Literal
@@ -12,43 +12,30 @@ from busplan.sourced import Constants
 Speed = Literal["S100", "S200", "S400", "S800", "S1600", "S3200"]
 
 c: Final = Constants("busplan.buses.ieee1394")
-"""Every constant with a source, by its name here."""
+"""Constants with a source, by their names."""
 
 BETA_SPEEDS: Final = ("S800", "S1600", "S3200")
-"""Speeds of IEEE 1394b, whose arbitration has no gaps and no published time: what is computed is a lower bound."""
+"""Speeds of IEEE 1394b. Its arbitration has no gaps and no published time, so each computed time is a lower bound."""
 MAX_GAP_COUNT: Final = 63
-"""The gap count is a six-bit field of the PHY; 63 is also its value after power-up."""
+"""Largest value of the PHY's six-bit gap count, and its value after power-up."""
 
 BITS_PER_BYTE: Final = 8
 QUADLET_BYTES: Final = 4
-"""A quadlet, the unit of every packet (paper, section I)."""
+"""Size of a quadlet, the unit of every packet (paper, section I)."""
 
 c.computed("SYNC_PACKET_BYTES", lambda c: c.QUADLET_WRITE_REQUEST_BYTES)
 
 GAP_COUNT_BY_HOPS: Final = (
     5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62,
 )  # fmt: skip
-"""Smallest safe gap count for 1, 2, ... hops; see `GAP_COUNT_TABLE_HOPS`."""
+"""Smallest safe gap count for 1, 2, ... hops; source: `GAP_COUNT_TABLE_HOPS`."""
 c.computed("GAP_COUNT_TABLE_HOPS", lambda _: len(GAP_COUNT_BY_HOPS))
 
 
 def safe_gap_count(hops: Number) -> Number:
-    """Smallest gap count that is safe for a bus of that many hops.
+    """Smallest gap count that is safe for a bus of `hops` cable hops between its two farthest nodes [1].
 
-    Parameters
-    ----------
-    hops
-        Largest number of cable hops between two nodes, 1 or more [1]; of any sort.
-
-    Returns
-    -------
-    int
-        Gap count of the published table; the power-up value 63 beyond its 23 hops.
-
-    Raises
-    ------
-    ValueError
-        `hops` is a plain number below 1.
+    The power-up value 63 holds beyond the 23 hops of the published table. A plain number below 1 raises ValueError.
 
     References
     ----------
@@ -66,17 +53,7 @@ def safe_gap_count(hops: Number) -> Number:
 
 
 def padded_bytes(payload_bytes: Number) -> Number:
-    """Payload filled up to whole quadlets, as it travels in a block packet [bytes].
-
-    Parameters
-    ----------
-    payload_bytes
-        Payload [bytes]; of any sort.
-
-    Returns
-    -------
-    int
-        The next multiple of 4 [bytes].
+    """Payload padded to whole quadlets, as it travels in a block packet [bytes].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The individual schedule, a read and a write of each node, and what both schedules have in common."""
+"""The individual schedule, a read and a write of each node, and the base class of both schedules."""
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -57,12 +57,12 @@ EVENTS: Final = (
     EventKind("retry", "busy retry", "profile", "r", "request"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
-"""Kinds of events, in the order of the cycle."""
+"""Kinds of events in the order of the cycle."""
 STRETCHES: Final = (
     EventKind("read", "reads", "", "R", "in"),
     EventKind("write", "writes", "", "W", "out"),
 )
-"""Stretches that several events make together."""
+"""Kinds of stretches, each a sequence of events."""
 
 
 PREMISES: Final = (
@@ -76,7 +76,7 @@ PREMISES: Final = (
 
 
 class CycleWithStarts(BusCycle):
-    """One communication cycle; what the host and the nodes send in it is that of a schedule.
+    """One communication cycle with its cycle starts; a subclass gives the packets of its schedule.
 
     References
     ----------
@@ -95,20 +95,23 @@ class CycleWithStarts(BusCycle):
 
     @abstractmethod
     def schedule(self) -> Iterator[BusEvent | Run]:
-        """The cycle in the order of its protocol, without retries and the window, which follow it."""
+        """Events of the cycle in the order of the protocol, without the retries and the window that follow them."""
 
     @abstractmethod
     def longest(self, kind: TransactionKind) -> Phases:
-        """The longest of each phase, over all reads or all writes [us]."""
+        """The maximum of each phase over all reads or all writes [us]."""
 
     @cached_property
     def delays(self) -> Delays:
-        """Arbitration, acknowledge and gaps over the way to the farthest node [us]."""
+        """Arbitration, acknowledge and gaps over the hops to the farthest node [us]."""
         return delays(self.link, model=self.model, alone=self.network.nodes == 1)
 
     @cached_property
     def cycle_start_us(self) -> Number:
-        """Cost of a cycle start: it destroys idle time already run, and goes at S100, or faster without gaps [us]."""
+        """Cost of a cycle start [us].
+
+        It destroys idle time that has already run. It goes at S100; without gaps, at the rate of the bus.
+        """
         delays = self.delays
         data_us = equations.data_phase_us(
             delays.link.hops,
@@ -120,15 +123,10 @@ class CycleWithStarts(BusCycle):
         return delays.gaps.arbitration_reset_us + delays.arbitration_us + data_us + isochronous_us
 
     def starts(self, terms_us: Number) -> Number:
-        """Number of cycle starts in a cycle whose other terms take some time [1].
+        """Number of cycle starts in a cycle whose other terms take `terms_us` [1].
 
-        The smallest whole n with n > (other terms + n start) / 125 us. Starts with less than 1 us between them are
-        counted as if there were that: the number is finite, and the limit of cycle starts is broken.
-
-        Parameters
-        ----------
-        terms_us
-            All other terms [us]; of any sort.
+        The smallest whole n with n > (other terms + n start) / 125 us. Less than 1 us between two starts counts as 1
+        us: the number stays finite, and the limit of cycle starts reports the fault.
         """
         left_us = c.CYCLE_US - self.cycle_start_us
         return rounded_down(terms_us / larger(left_us, c.LEAST_ASYNCHRONOUS_US)) + 1
@@ -147,11 +145,11 @@ class CycleWithStarts(BusCycle):
 
     @cached_property
     def number_of_starts(self) -> Number:
-        """Cycle starts in the cycle [1]."""
+        """Number of cycle starts in the cycle [1]."""
         return self.starts(self._without_starts_us) if self._has_starts else 0
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """All events but the cycle starts, whose number depends on them and which go between the rounds."""
+        """All events but the cycle starts: they go between the rounds, and their number depends on these events."""
         yield from self.schedule()
         retries: Number = self.network.profile.cycle.retries
         if self.model != "paper" and not is_off(retries):
@@ -167,29 +165,29 @@ class CycleWithStarts(BusCycle):
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
-        """Time of each term, by its key [us]."""
+        """Time of each term by its key [us]."""
         starts = (Run((self._start,), self.number_of_starts),) if self._has_starts else ()
         return self._terms_without_starts | summed(starts, (self._start.term,))
 
     @abstractmethod
     def all_us(self, kind: TransactionKind) -> Number:
-        """All reads T_r or all writes T_w of a cycle, with their gaps [us]."""
+        """Time of all reads T_r or all writes T_w of a cycle, gaps included [us]."""
 
     @cached_property
     @step(READS.symbol)
     def reads_us(self) -> Number:
-        """T_r [us]."""
+        """Time T_r of all reads [us]."""
         return self.all_us("read")
 
     @cached_property
     @step(WRITES.symbol)
     def writes_us(self) -> Number:
-        """T_w [us]."""
+        """Time T_w of all writes [us]."""
         return self.all_us("write")
 
     @property
     def required_time_slice_us(self) -> Number:
-        """Equation (2); cycle starts and retries, which the paper does not have, are added [us]."""
+        """Time slice that a node needs, equation (2), with cycle starts and retries, which the paper has not [us]."""
         terms, nodes = self.by_term, self.network.nodes
         slice_us = required_time_slice_us(
             self.reads_us,
@@ -202,7 +200,7 @@ class CycleWithStarts(BusCycle):
         return slice_us + total(added) / nodes if added else slice_us
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
-        """Growth of the cycle if its transactions take longer: there may be more cycle starts, too [us]."""
+        """Growth of the cycle when its transactions take longer; cycle starts may be added [us]."""
         if not self._has_starts:
             return extra_us
         before_us = self._without_starts_us + after_us
@@ -210,12 +208,16 @@ class CycleWithStarts(BusCycle):
         return extra_us + more * self.cycle_start_us
 
     def taking_us(self, group: Group) -> float:
-        """0 after a split write, which contains the execution; otherwise the node executes beside the bus [us]."""
+        """Execution time after a write [us]; 0 for a split write, which contains it."""
         is_split = group.node.write_response == "split" and not is_broadcast(self.network)
         return 0.0 if is_split else super().taking_us(group)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """1, or more if a node has not executed its command when the next synchronous packet comes."""
+        """Periods inside a loop [1].
+
+        With `at_sync` 1, or more where a node has not executed its command when the next synchronous packet comes; else
+        0, as commands take effect on arrival.
+        """
         if not at_sync:
             return 0
         behind_us = max(self.taking_us(group) for group in self.network.groups)
@@ -224,7 +226,7 @@ class CycleWithStarts(BusCycle):
         return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Settings of the bus, the latencies and gaps, and the number of nodes by equation (11)."""
+        """Settings of the bus, latencies, gaps, and the number of nodes by equation (11)."""
         read, write, safe = self.longest("read"), self.longest("write"), safe_gap_count_of(self.network)
         return {
             "hops": self.link.hops,
@@ -246,16 +248,16 @@ class CycleWithStarts(BusCycle):
         }
 
     def published_nodes(self) -> Number | None:
-        """Number of nodes by equation (11) [1]; None where the paper has none for this schedule or these nodes."""
+        """Number of nodes by equation (11) [1]; None where the paper has none for the schedule or the nodes."""
         return None
 
     @property
     def executes(self) -> bool:
-        """Other answers than split ones, and broadcasts, keep the execution off the bus."""
+        """Whether execution is on the bus: only split answers put it there; other answers and broadcasts do not."""
         return self.network.bus.has_execution(self.network)
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
-        """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
+        """Rounds of the cycle, node by node; a cycle start goes when it is due, or at the end."""
         starts, start_us = int(self.number_of_starts), self.cycle_start_us
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
@@ -269,7 +271,7 @@ class CycleWithStarts(BusCycle):
         yield from repeat(start, starts - sent)
 
     def added_before_us(self, sent_us: float) -> float:
-        """The cycle starts that are due before a round [us]."""
+        """Time of the cycle starts that are due before a round [us]."""
         due = smaller(self.starts(sent_us), self.number_of_starts)
         return due * self.cycle_start_us
 
@@ -278,8 +280,8 @@ class Ieee1394Cycle(CycleWithStarts):
     """The synchronous packet, a read and then a write of every node, and the window for non-periodic data.
 
     The times of a node count the hops of the farthest node or, with `charge_hops = "own"`, its own; its arbitration
-    counts its own only where the host is the root. What all nodes hear, as the synchronous packet, goes to the
-    farthest.
+    counts its own hops only where the host is the root. Packets for all nodes, such as the synchronous packet, always
+    go to the farthest.
 
     References
     ----------
@@ -288,12 +290,12 @@ class Ieee1394Cycle(CycleWithStarts):
 
     @cached_property
     def exchanges(self) -> tuple[Exchange, ...]:
-        """Every transaction of the cycle, with the nodes of each group on the mean."""
+        """Transactions of the cycle, each with the mean node of its group."""
         return self._exchanges([hops.mean for hops in self._hops])
 
     @cached_property
     def _farthest(self) -> tuple[Exchange, ...]:
-        """Every transaction with the farthest node of each group."""
+        """Transactions with the farthest node of each group."""
         is_mean = not charges_own_hops(self.network)
         return self.exchanges if is_mean else self._exchanges([hops.last for hops in self._hops])
 
@@ -304,7 +306,7 @@ class Ieee1394Cycle(CycleWithStarts):
         return (GroupHops(*(self.link.hops,) * 3),) * len(self.network.groups)
 
     def _exchanges(self, hops: Sequence[Number]) -> tuple[Exchange, ...]:
-        """Every transaction with nodes at some hops, by group; a derivation tells their phases apart."""
+        """Transactions of all groups, each with a node at the given hops; a derivation tells their phases apart."""
         places = range(len(self.network.groups))
         exchanges = tuple(self._exchange(place, kind, hops[place]) for kind in TRANSACTION_KINDS for place in places)
         for sent in exchanges:
@@ -314,12 +316,12 @@ class Ieee1394Cycle(CycleWithStarts):
         return exchanges
 
     def _exchange(self, place: int, kind: TransactionKind, hops: Number) -> Exchange:
-        """The transaction of a group by its place, with a node at some hops."""
+        """Transaction with a node at the given hops, of the group at `place`."""
         delays = self.delays_to(hops)
         return exchange(self.network, self.network.groups[place], kind, model=self.model, delays=delays)
 
     def delays_to(self, hops: Number) -> Delays:
-        """Delays to a node at some hops; its arbitration goes to the root, which may be any node [us]."""
+        """Delays to a node at the given hops; its arbitration goes to the root, which may be any node [us]."""
         farthest = self.delays
         if not charges_own_hops(self.network):
             return farthest
@@ -329,17 +331,17 @@ class Ieee1394Cycle(CycleWithStarts):
         return delays._replace(arbitration_us=farthest.arbitration_us, arbitration_hops=farthest.arbitration_hops)
 
     def delays_to_farthest(self, name: str) -> Delays:
-        """Delays to the farthest node of a group of the profile, by its name [us]."""
+        """Delays to the farthest node of the group of that name [us]."""
         groups = enumerate(self.network.groups)
         place = next(place for place, group in groups if name in [member.name for member in group.members])
         return self.delays_to(self._hops[place].last)
 
     @cached_property
     def sync_us(self) -> Number:
-        """CTS, the synchronous packet that opens the cycle [us].
+        """Time CTS of the synchronous packet that opens the cycle [us].
 
-        In `paper` its measured latency; in `standard` a broadcast write without an acknowledge, the host's first packet
-        of the interval.
+        In `paper` it is the measured latency; in `standard` a broadcast write without an acknowledge, which is the
+        host's first packet of the fairness interval.
         """
         if self.model == "paper":
             sync = self.network.profile.cycle.sync
@@ -349,7 +351,7 @@ class Ieee1394Cycle(CycleWithStarts):
         return delays.arbitration_us + delays.data_us(c.SYNC_PACKET_BYTES) + delays.gaps.arbitration_reset_us
 
     def schedule(self) -> Iterator[BusEvent | Run]:
-        """The synchronous packet, and each transaction of every node."""
+        """The synchronous packet, then each transaction of every node."""
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
         for kind in TRANSACTION_KINDS:
             for place, transaction in enumerate(sent for sent in self.exchanges if sent.kind == kind):
@@ -358,13 +360,13 @@ class Ieee1394Cycle(CycleWithStarts):
                 )
 
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
-        """The transaction with a node of a group, by the node's number in it from 0."""
+        """Events of the transaction with one node of a group; `number` counts the group's nodes from 0."""
         if charges_own_hops(self.network):
             transaction = self._exchange(place, transaction.kind, self._hops[place].of_node(number))
         return events(transaction, model=self.model)
 
     def all_us(self, kind: TransactionKind) -> Number:
-        """Each read or write of all nodes, with its gaps [us]."""
+        """Time of the reads or writes of all nodes, gaps included [us]."""
         sent = (exchange for exchange in self.exchanges if exchange.kind == kind)
         return total(exchange.group.nodes * exchange.phases.transaction_us for exchange in sent)
 
@@ -375,20 +377,20 @@ class Ieee1394Cycle(CycleWithStarts):
         return doubts.bias_us(self.exchanges, self.network, link=self.link)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """Inputs that are not known exactly."""
+        """Doubt of each input that is not known exactly."""
         if self.model == "paper":
             return ()
-        # Hops of the synchronous packet, of retries and of cycle starts; `of_cycle` adds those of transactions.
+        # Hops of the synchronous packet, of retries and of cycle starts; `of_cycle` adds those of the transactions.
         hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * self.number_of_starts
         return doubts.of_cycle(self.exchanges, self.network, delays=self.delays, hop_delays=hop_delays)
 
     def longest(self, kind: TransactionKind) -> Phases:
-        """The longest of each phase, over the reads or writes with the farthest node of each group [us]."""
+        """The maximum of each phase over the reads or writes with the farthest node of each group [us]."""
         columns = zip(*(sent.phases for sent in self._farthest if sent.kind == kind), strict=True)
         return Phases(*(reduce(larger, column) for column in columns))
 
     def published_nodes(self) -> Number | None:
-        """Number of nodes by equation (11), where all nodes are alike [1]."""
+        """Number of nodes by equation (11) [1]; None where nodes differ."""
         network = self.network
         if not network.is_uniform:
             return None
@@ -402,7 +404,7 @@ class Ieee1394Cycle(CycleWithStarts):
         )
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """A read and a write of the farthest node of each group."""
+        """Latencies of a read and of a write, with the farthest node of each group."""
         latencies, all_us = [], {"read": self.reads_us, "write": self.writes_us}
         for place, kind in product(range(len(self.network.groups)), TRANSACTION_KINDS):
             sent = self._exchange(place, kind, self._hops[place].last)

@@ -1,4 +1,4 @@
-"""How well a cycle is known: the residual of Table I, the bias by it, and the doubt of each input."""
+"""Uncertainty of a cycle: the residual of Table I, the bias by it, and the doubt of each input."""
 
 from collections.abc import Callable, Sequence
 from math import sqrt
@@ -25,7 +25,7 @@ from busplan.elementwise import Number, choose, is_off, larger, named, step, tot
 from busplan.sourced import Sourced, cached
 
 _RECTANGULAR: Final = sqrt(3)
-"""Half of a range over its standard uncertainty (JCGM 100, 4.3.7)."""
+"""Ratio of half a range to its standard uncertainty (JCGM 100, 4.3.7)."""
 
 
 class ModelResidual(NamedTuple):
@@ -33,24 +33,19 @@ class ModelResidual(NamedTuple):
 
     mean_us: Sourced
     uncertainty_us: Sourced
-    """Standard uncertainty of the next half: `Spread`."""
+    """Standard uncertainty of one further half: `Spread`."""
 
 
 @cached(maxsize=16)
 def residual(model: TimingModelName = "standard") -> ModelResidual:
     """Residual of T1 + T2, equation (13), over the rows of Table I.
 
-    Parameters
-    ----------
-    model
-        Timing model.
-
     Examples
     --------
     >>> round(residual().mean_us, 3), round(residual("paper").mean_us, 3)
     (0.827, 3.131)
     """
-    # The way of a packet on the bench.
+    # Link of the bench.
     bench = Link(float(c.by_key("DATA_RATE_MBIT_S")["S400"]), MAX_GAP_COUNT, 1, float(c.REFERENCE_CABLE_M))
     differences = []
     for row in rows_of("paper", "bias and U"):
@@ -76,36 +71,20 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
 
 
 def gap_term_us(gap_count: Number, *, measured: Number = MAX_GAP_COUNT, symbol: str = "d") -> Number:
-    """Half of what the gap term of equation (4) changes between two gap counts: d [us].
+    """Half the change of equation (4)'s gap term between two gap counts: d [us].
 
-    Parameters
-    ----------
-    gap_count
-        Gap count in force [1].
-    measured
-        Gap count that the error of the model was measured at, by default that of Table I [1].
-    symbol
-        Symbol in a derivation.
+    The error of the model was measured at gap count `measured`, by default that of Table I.
     """
     ticks = c.ARBITRATION_GAP_TICKS / 2
     return named(ticks * (measured - gap_count) / c.BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
 
 
 def bias_us(exchanges: Sequence[Exchange], network: Network, *, link: Link) -> Number:
-    """Mean time of a cycle beyond the model; none beyond a lower bound [us].
+    """Mean time of a cycle beyond the model [us]; 0 for a lower bound.
 
     Half-count (b + d): b is the mean residual of Table I. d is the middle of two readings of it, which a single gap
-    count cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4). An
-    execution time that was fitted against the model holds the error of split transactions, and of no others.
-
-    Parameters
-    ----------
-    exchanges
-        Every transaction of the cycle.
-    network
-        The network.
-    link
-        The link.
+    count cannot tell apart: the difference is constant, or it stands in the gap term of equation (4). An execution time
+    that was fitted against the model contains the error of split transactions, and of no others.
     """
     if not link.has_gaps:
         return 0.0
@@ -121,28 +100,20 @@ def bias_us(exchanges: Sequence[Exchange], network: Network, *, link: Link) -> N
 def of_cycle(
     exchanges: Sequence[Exchange], network: Network, *, delays: Delays, hop_delays: Number
 ) -> tuple[Doubt, ...]:
-    """The standard uncertainty of a cycle of the individual schedule by each of its inputs.
+    """Standard uncertainty of a cycle of the individual schedule by each of its inputs.
 
-    Parameters
-    ----------
-    exchanges
-        Every transaction of the cycle.
-    network
-        The network.
-    delays
-        Delays to the farthest node.
-    hop_delays
-        How often the delay of all hops stands in the cycle beside its transactions [1].
+    `delays` are those to the farthest node. `hop_delays` counts how often the delay of all hops stands in the cycle
+    outside its transactions [1].
     """
     host_us: Number = network.profile.host.standard_uncertainty_us
     split, other_halves = _split_halves(exchanges), _other_halves(exchanges, network)
     link, spread_us = delays.link, residual().uncertainty_us
-    # One reading is wrong by the same share in all: signs count.
+    # A wrong reading errs by the same share everywhere, so signs count.
     of_split_us = total(halves * _split_gap_term_us(node, link.gap_count) for node, halves in split)
     of_packets = total(exchange.group.nodes * _hop_delays(exchange) for exchange in exchanges)
 
     def busy_swing_us(exchange: Exchange, execution_us: Number, host_us: Number) -> Number:
-        """Change of a transaction by a standard uncertainty of its execution or of the host."""
+        """Change of a transaction by a standard uncertainty of its execution time or of the host's time [us]."""
         responder = exchange.responder
         if is_off(execution_us if responder.answer == "split" else 0.0) and is_off(host_us):
             return 0.0
@@ -187,25 +158,14 @@ def of_inputs(
     host_us: Number,
     execution: Doubt | None = None,
 ) -> tuple[Doubt, ...]:
-    """The standard uncertainty of a cycle by each of its inputs.
+    """Standard uncertainty of a cycle by each of its inputs.
 
-    Parameters
-    ----------
-    residual_us
-        By the residual of Table I [us].
-    gap_term_us
-        Sum of the gap terms d [us].
-    phy_delays
-        How often the delay of a PHY stands in the cycle [1].
-    link
-        The link: a profile that gives the delay of a PHY leaves no doubt of it.
-    host_us
-        By the host's own time [us].
-    execution
-        Doubt of the execution times, where the cycle has any.
+    `gap_term_us` is the sum of the gap terms d [us], and `phy_delays` counts how often the delay of a PHY stands in the
+    cycle [1]. A profile that gives the delay of a PHY leaves no doubt of it. `execution` is None for a cycle without
+    execution times.
     """
     if not link.has_gaps:
-        # What is left out of a lower bound has no doubt of its own: no verdict rests on the bound but "does not fit".
+        # Times left out of a lower bound carry no doubt: only the verdict "does not fit" rests on the bound.
         residual_us = gap_term_us = phy_delays = 0.0
     half_width_us = c.PHY_DELAY_HALF_WIDTH_US if link.phy_delay_us is None else 0.0
     return (
@@ -218,21 +178,17 @@ def of_inputs(
 
 
 def swing_us(time_us: Callable[[int], Number]) -> Number:
-    """Change by a standard uncertainty: half the larger of two steps, two uncertainties up and two down [us].
+    """Change by one standard uncertainty [us]: half the larger of two steps, two uncertainties up and two down.
 
-    The cycle never falls with a time and has kinks, at which a central difference covers too little.
-
-    Parameters
-    ----------
-    time_us
-        From a number of standard uncertainties to the time [us].
+    `time_us` gives the time at a number of standard uncertainties. The cycle never falls with a time and has kinks, at
+    which a central difference covers too little.
     """
     above_us, planned_us, below_us = time_us(2), time_us(0), time_us(-2)
     return larger(above_us - planned_us, planned_us - below_us) / 2
 
 
 def _hop_delays(exchange: Exchange) -> Number:
-    """Delays of hops in a transaction: arbitrations over the way to the root, other parts over the node's own [1]."""
+    """Hop delays in a transaction: those of arbitrations to the root, those of other parts to the node [1]."""
     packets = [part.term for part in exchange.parts if part.term in PACKET_PARTS]
     arbitrations = packets.count(ARBITRATION)
     hops = (len(packets) - arbitrations) * exchange.delays.link.hops
@@ -240,7 +196,7 @@ def _hop_delays(exchange: Exchange) -> Number:
 
 
 def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ...]:
-    """Halves of split transactions in the cycle, each a packet that is acknowledged: by sort of node [1]."""
+    """Halves of split transactions in the cycle, by sort of node; a half is a packet with its acknowledge [1]."""
     counts: dict[int, tuple[Any, list[Number]]] = {}
     for exchange in exchanges:
         if exchange.responder.answer == "split":
@@ -257,7 +213,7 @@ def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
 
 
 def _is_fitted(node: Any) -> Number:
-    """Whether an execution time holds the error of the model, because it was fitted against it: a truth."""
+    """Whether the execution time contains the error of the model because it was fitted against it (a truth)."""
     truth: Number = node.execution.residual == "standard"
     return truth
 

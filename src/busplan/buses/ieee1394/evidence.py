@@ -1,4 +1,4 @@
-"""Figures of IEEE 1394 for rows of evidence, beside those of a cycle."""
+"""Figures of IEEE 1394 for rows of evidence, beyond those of a cycle."""
 
 from collections.abc import Callable, Mapping
 from math import ceil
@@ -17,7 +17,7 @@ from busplan.buses.published import published
 
 
 def equation_15_constant_us(_cycle: object, *, nodes: int, gap_count: int, overhead_bytes: int, rounded: bool) -> float:
-    """The constant of equation (15): the terms of equations (4)-(6), each rounded to two decimals or not [us]."""
+    """Constant of equation (15): the terms of equations (4)-(6), rounded to two decimals where `rounded` [us]."""
     s400 = c.by_key("DATA_RATE_MBIT_S")["S400"]
     hop_us = nodes * equations.hop_delay_us(c.REFERENCE_CABLE_M, phy_delay_us=equations.phy_delay_us(s400))
     terms_us = (
@@ -29,7 +29,7 @@ def equation_15_constant_us(_cycle: object, *, nodes: int, gap_count: int, overh
 
 
 def host_for_gain_us(cycle: Ieee1394Cycle, *, gain: float) -> float:
-    """The host's own time in each call with which the schedules differ by some factor, by halves [us]."""
+    """Host time at which the individual schedule takes `gain` times the broadcast schedule, by bisection [us]."""
     profile, low_us, high_us = cycle.network.profile, 0.0, 1000.0
     for _ in range(50):
         middle_us = (low_us + high_us) / 2
@@ -41,7 +41,10 @@ def host_for_gain_us(cycle: Ieee1394Cycle, *, gain: float) -> float:
 
 
 def gap_counts_met(_cycle: object, *, derived: bool) -> int:
-    """Entries of the published table that the table of the program has, or that cable and PHY give at the base rate."""
+    """Number of entries of the published gap-count table that the program agrees with [1].
+
+    With `derived` they are computed from cable and PHY at the base rate; otherwise they are the program's table.
+    """
     table: Any = published("ieee1394")["gap_counts"]
 
     def computed(hops: int) -> float:

@@ -74,9 +74,9 @@ TERMS: Final = (
     _term("retries", "profile", "busy retries of the longest request", "request", "T", key="{}_us"),
     NONPERIODIC,
 )
-"""In the order of the wire."""
+"""Terms of the cycle in the order of the wire."""
 _FIRST: Final = (SYNC, NONPERIODIC)
-"""Terms that the document has before the others."""
+"""Terms that come first in the document."""
 
 _SUBACTION_GAP: Final = Figure("subaction_gap_us", "T_sub", by(eq.subaction_gap_us), "subaction gap", "subaction gap")
 _RESET_GAP: Final = Figure(
@@ -90,7 +90,7 @@ _BOTH_GAPS: Final = Figure("gaps_us", "T_sum", by(eq.gaps_us), "both gaps, after
 
 
 def _of_both(key: str, symbol: str, reference: str, meaning: str, label: str) -> tuple[Figure, ...]:
-    """A figure of a read and of a write, by formats of the word."""
+    """One figure of a read and one of a write, from words with a place for the kind."""
     return tuple(
         Figure(f"{kind}_{key}", symbol.format(kind), reference, meaning.format(kind), label.format(kind), better="less")
         for kind in ("read", "write")
@@ -191,7 +191,7 @@ _PHASES: Final = (
     Figure("transaction_us", "T_trans", "idle", "what the transaction takes of the cycle", "takes of the cycle"),
     Figure("all_us", "T_r or T_w", "idle", "all reads or all writes of the cycle", "all of the cycle, T_r or T_w"),
 )
-"""In the order of the bench: T1+T2, T3, T4+T5, and the gaps after them."""
+"""Phases in the order of the bench: T1+T2, T3, T4+T5, and the gaps after them."""
 LATENCY: Final = (TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COUNT, *_PHASES)
 
 FIGURES: Final = BusFigures(

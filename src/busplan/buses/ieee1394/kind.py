@@ -1,4 +1,4 @@
-"""IEEE 1394 (FireWire), as a kind of bus."""
+"""IEEE 1394 (FireWire) as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Final
@@ -41,17 +41,14 @@ from busplan.english import plural
 from busplan.errors import BusplanError
 
 _HOST_STEP_US: Final = 10.0
-"""Step by which the host is made slower, for the sensitivity of the margin."""
+"""Step by which the host is slowed for the sensitivity of the margin [us]."""
 
 
 def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> PacketTime:
     """Time of the packets of a split transaction with the farthest node of a group.
 
-    Raises
-    ------
-    BusplanError
-        Nodes do not answer such a transaction split: then no execution time is on the bus. Or the times of the speed
-        are lower bounds.
+    Raises `BusplanError` where the nodes do not answer split, for then no execution time is on the bus, and where the
+    times of the speed are lower bounds.
     """
     if not has_gaps(network):
         raise BusplanError(
@@ -83,7 +80,7 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
 
 
 def fitted_against(network: Network, model: str) -> dict[str, Value]:
-    """The timing model and the gap count."""
+    """Timing model and gap count that an execution time is fitted against."""
     return {"residual": model, "measured_gap_count": int(gap_count_of(network))}
 
 
@@ -92,10 +89,10 @@ _UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}
 
 
 def _gap_count(network: Network) -> Setting:
-    """The smallest safe gap count."""
+    """Setting of the smallest safe gap count."""
     key = "bus.gap_count"
     empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
-    # From S800 on there are no gaps, and the table holds for some cables alone.
+    # From S800 on there are no gaps; the table holds only for cables of its length.
     if not (has_gaps(network) and network.profile.bus.cable_is_standard):
         return empty
     safe = safe_gap_count_of(network)
@@ -103,7 +100,7 @@ def _gap_count(network: Network) -> Setting:
 
 
 def _responses(network: Network) -> Setting:
-    """Answers without a second arbitration: of reads, of writes, of both."""
+    """Setting of answers without a second arbitration: of reads, of writes, of both."""
     keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
     if is_broadcast(network):
         return Setting("responses", "responses", Cost.RESPONSES, keys, ())
@@ -175,16 +172,16 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
     evidence_data = ("paper", "dvrk", "ieee1394")
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
-        """The cycle of a network under a timing model, by its schedule."""
+        """Cycle of a network under a timing model, by its schedule."""
         schedule = BroadcastCycle if is_broadcast(network) else Ieee1394Cycle
         return schedule(network, model)  # type: ignore[arg-type]
 
     def evidence_for(self, network: Network) -> tuple[str, ...]:
-        """No figure from S800 on was published."""
+        """Evidence data for the network; none from S800 on, where no figure is published."""
         return self.evidence_data if has_gaps(network) else ()
 
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:
-        """Keys that the paper's equations have no term for."""
+        """Keys of the profile for which the paper's equations have no term."""
         profile = network.profile
         paper_has_not = {
             "bus.speed": not has_gaps(network),
@@ -202,7 +199,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         return tuple(key for key, is_set in paper_has_not.items() if is_set) if model == "paper" else ()
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose latency it is."""
+        """Words for the way that the latency covers."""
         if is_broadcast(network):
             return ", ".join(("the data of all nodes to the host and the commands to them", *self.setup_words(network)))
         nodes = f"{plural(int(network.nodes), 'node')}"
@@ -214,13 +211,13 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         return not is_broadcast(network) and any(map(answers_split, network.groups))
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """The gap count, one register in each node, how the nodes answer, and the other schedule."""
+        """Settings to try: the gap count (one register in each node), the nodes' answers, and the other schedule."""
         key, schedule_name = "cycle.schedule", "individual" if is_broadcast(network) else "broadcast"
         schedule = Setting("schedule", "schedule", Cost.SCHEDULE, (key,), ({key: schedule_name},))
         return (_gap_count(network), _responses(network), schedule)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """One hop, one busy retry, and a slower host."""
+        """Perturbations of the margin: one more hop, one more busy retry, a slower host."""
         profile = network.profile
         is_chain = profile.bus.max_hops is None
         return (
@@ -238,12 +235,12 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Payloads of whole quadlets, up to the largest packet of the speed."""
+        """Payloads in whole quadlets, up to the largest packet of the speed."""
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(c.by_key("MAX_PAYLOAD_BYTES")[speed]), carrier=speed)
 
     def path_words(self, network: Network) -> str:
-        """Say whose hops each node is charged."""
+        """Words for the hops that each node is charged."""
         if is_broadcast(network):
             return "every packet at the hops of the farthest"
         if not charges_own_hops(network):
@@ -252,14 +249,14 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         return f"every node at its own hops{', arbitration at all' if is_at_all else ''}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """Hops, gap count, and a schedule other than the individual schedule."""
+        """Words for hops, gap count and a schedule other than the individual one."""
         hops, cycle = hops_of(network), network.profile.cycle
         schedule = (f"broadcast schedule by {cycle.broadcast_request} requests",) if is_broadcast(network) else ()
         gaps = f"gap count {gap_count_of(network)}" if has_gaps(network) else "no gaps: lower bounds"
         return (f"{plural(int(hops), 'hop')}", gaps, *schedule)
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
-        """An unsafe gap count, and cables that the table does not hold for."""
+        """Warnings of an unsafe gap count, and of cables that the table does not hold for."""
         bus = network.profile.bus
         sizes = [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]
         warnings = [unsafe_words(sized) for sized in sizes if not self.is_safe(sized)][:1]

@@ -1,4 +1,4 @@
-"""Limits of IEEE 1394, and the rules of the gate that only this bus has.
+"""Limits of IEEE 1394, and the gate rules that only this bus has.
 
 A gap count below the table fits, but is not safe.
 """
@@ -33,7 +33,7 @@ def _most_payload(network: Network) -> Number:
 
 
 def _of_broadcast(value: Callable[[Network], Number]) -> Callable[[Network], Number]:
-    """A value that only the broadcast schedule has; 0 under the other."""
+    """A limit's value under the broadcast schedule; 0 under the individual one."""
     return lambda network: value(network) if is_broadcast(network) else 0
 
 
@@ -43,7 +43,7 @@ def _cycle_start_us(network: Network) -> Number:
 
 
 def unsafe_words(network: Network) -> str:
-    """Say which gap count is unsafe for which hops, and which is the smallest safe one; of plain numbers."""
+    """Sentence that names the unsafe gap count, its hops and the smallest safe one; the network has plain numbers."""
     hops, nodes = hops_of(network), plural(int(network.nodes), "node")
     cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {c.REFERENCE_CABLE_M:g} m"
     return (
@@ -53,25 +53,25 @@ def unsafe_words(network: Network) -> str:
 
 
 class UnknownArbitration(Limit):
-    """Above S400 no arbitration time is published: the cycle is a lower bound."""
+    """Limit of the arbitration above S400: its time is not published, so the cycle is a lower bound."""
 
     key = "arbitration"
     way_out = "up to S400 all of it is known"
 
     def value(self, network: Network) -> Number:
-        """1 above S400."""
+        """1 above S400, else 0."""
         return int(not has_gaps(network))
 
     def most(self, _network: Network) -> Number:
-        """0."""
+        """0: no arbitration may be unknown."""
         return 0
 
     def perhaps(self, network: Network) -> Number:
-        """All of the value: no cycle is known to be too long because of it."""
+        """All of the value: the limit alone never shows that a cycle is too long."""
         return self.value(network)
 
     def words(self, network: Network) -> str:
-        """That it is a lower bound."""
+        """Sentence that the cycle is a lower bound."""
         speed = network.profile.bus.speed
         return f"the arbitration of {speed} has no published time, so the cycle is a lower bound"
 
@@ -142,7 +142,7 @@ def _bus(subject: RuleSubject) -> "Ieee1394Bus":
 
 
 def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The paper's equations say otherwise."""
+    """Problem where the paper's equations contradict the verdict."""
     for model, fits in subject.others_fit:
         if contradicts(fits, subject.deciding):
             story = "that it fits" if fits else "that it does not fit"
@@ -151,7 +151,7 @@ def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The plan rests on a gap count that a bus reset takes away."""
+    """Problem where the plan needs a gap count that a bus reset undoes."""
     figures = subject.deciding
     if figures.verdict == "fits" and figures.own["gap_count"] < MAX_GAP_COUNT:
         after = subject.after({"bus.gap_count": MAX_GAP_COUNT})
@@ -165,14 +165,14 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """More nodes than one bus has addresses for."""
+    """Problem where one bus has too few addresses for the nodes."""
     if "nodes" in subject.deciding.exceeded:
         key = subject.profile.node_groups[-1].nodes_key
         yield RuleProblem(key, subject.limit_words("nodes"), "put the others on a second bus")
 
 
 def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """More cable hops than the standard allows."""
+    """Problem where the bus has more cable hops than the standard allows."""
     if "hops" in subject.deciding.exceeded:
         is_chain = _bus(subject).max_hops is None
         key = subject.profile.node_groups[-1].nodes_key if is_chain else "bus.max_hops"
@@ -181,7 +181,7 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A payload larger than an asynchronous packet of this speed carries."""
+    """Problem where a payload exceeds an asynchronous packet of the speed."""
     speed = _bus(subject).speed
     most = int(c.by_key("MAX_PAYLOAD_BYTES")[speed])
     for key, size in _payloads(subject):
@@ -192,7 +192,7 @@ def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A payload that the wire fills up."""
+    """Problem where the wire pads a payload to whole quadlets."""
     for key, size in _payloads(subject):
         if size % QUADLET_BYTES:
             padded = padded_bytes(size)
@@ -209,22 +209,22 @@ def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
 
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A gap count below the table."""
+    """Problem where the gap count is below the table."""
     if not subject.deciding.own["gap_count_safe"]:
         yield RuleProblem("bus.gap_count", subject.limit_words("gap table"), *subject.cure())
 
 
 def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A gap count above the table."""
+    """Problem where the gap count is above the table."""
     figures = subject.deciding
     if "cycle starts" in figures.exceeded:
-        return  # no time is left, so none can be saved
+        return  # No time is left, so none can be saved.
     if figures.own["gap_count"] > figures.own["safe_gap_count"] and _bus(subject).cable_is_standard:
         yield RuleProblem("bus.gap_count", partial(_wasted, subject))
 
 
 def _wasted(subject: RuleSubject) -> str:
-    """Say what a gap count above the table costs."""
+    """Words for the time that a gap count above the table costs."""
     changes = {"bus.gap_count": "optimal"}
     figures, after = subject.deciding, subject.after(changes)
     saved, _ = told_apart(figures.required_us - after.required_us, 0.0)

@@ -1,4 +1,4 @@
-"""The keys that only profiles of an IEEE 1394 bus have, in [bus], [cycle] and [payload]."""
+"""Keys of [bus], [cycle] and [payload] that only an IEEE 1394 bus has."""
 
 from collections.abc import Iterator
 from typing import Annotated, Final, Literal
@@ -28,7 +28,7 @@ from busplan.sections.profile import Profile
 
 
 def _gap_count(value: object, handler: ValidatorFunctionWrapHandler) -> object:
-    # One message for the whole union, instead of one for each of its members.
+    # The union has one message, not one for each of its members.
     try:
         return handler(value)
     except ValueError:
@@ -106,7 +106,7 @@ class Ieee1394Bus(BusSection):
 
     @property
     def cable_is_standard(self) -> bool:
-        """Whether the cable is no longer than those that the gap-count table holds for."""
+        """Whether the gap-count table holds for the cable: it is no longer than the table's."""
         return self.cable_length_m <= c.REFERENCE_CABLE_M
 
 
@@ -160,7 +160,7 @@ class Ieee1394Payload(PayloadSection):
 
 
 class FittedExecution(Section):
-    """What an execution time that was fitted against a timing model holds of that model's error."""
+    """Keys of an execution time that was fitted against a timing model, and so contains that model's error."""
 
     residual: Literal["none", "paper", "standard"] = Field(
         default="none",
@@ -244,7 +244,7 @@ class Host(Section):
         if self.uncertainty_us is not None:
             return self.uncertainty_us
         unknown_us = time_uncertainty_us(self.transaction_us, is_guess=self.grade == "assumed")
-        # No time rests on no assumption.
+        # A time of 0 rests on no assumption.
         return choose(self.transaction_us == 0, 0.0, unknown_us)
 
 

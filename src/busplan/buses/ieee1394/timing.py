@@ -1,10 +1,10 @@
-"""The timing models: the phases of an asynchronous transaction under `paper` and under `standard`.
+"""The timing models: phases of an asynchronous transaction under `paper` and under `standard`.
 
-`paper` takes the equations as they are published: gaps and PHY delays are counted in the data rate, both packets of a
+`paper` takes the equations as published: gaps and PHY delays are counted in the data rate, both packets of a
 transaction carry the payload and the same overhead, and both gaps follow every transaction. `standard` counts gaps and
 PHY delays in the base rate, as the gap tables of three independent stacks show, gives every packet its real size on the
-wire, and takes the gaps as thresholds of an idle period.
-Operators only, as in `equations`: floats in, floats out; arrays in, arrays out.
+wire, and takes the gaps as thresholds of an idle period. Only operators are used, as in `equations`: floats in, floats
+out; arrays in, arrays out.
 """
 
 from typing import Literal, NamedTuple
@@ -22,57 +22,45 @@ TimingModelName = Literal["paper", "standard"]
 Answer = Literal["split", "concatenated", "unified"]
 """Answer of a node to a request.
 
-split: it acknowledges, executes, and arbitrates for its response. concatenated: its response follows its acknowledge,
-and the bus stays busy. unified: its acknowledge completes the transaction.
+split: the node acknowledges, executes, and arbitrates for its response. concatenated: the response follows the
+acknowledge, and the bus stays busy. unified: the acknowledge completes the transaction.
 """
 
 
 class Link(NamedTuple):
-    """The way of a packet between host and node.
-
-    Parameters
-    ----------
-    data_rate_mbit_s
-        Data rate R [Mbit/s].
-    gap_count
-        Gap count g of the bus [1].
-    hops
-        Cable hops H between host and node [1].
-    cable_length_m
-        Length of a cable [m].
-    phy_delay_us
-        Repeat delay of a PHY [us]; None for that of the equations, 14 ticks of the gap clock.
-    has_gaps
-        Whether the bus arbitrates with gaps, as up to S400. Without them all times are lower bounds.
-    """
+    """Path of a packet between host and node."""
 
     data_rate_mbit_s: Number
     gap_count: Number
     hops: Number
+    """Cable hops between host and node [1]."""
     cable_length_m: Number
+    """Length of one cable [m]."""
     phy_delay_us: Number | None = None
+    """Repeat delay of a PHY [us]; None for 14 ticks of the gap clock, as in equations (4)-(6)."""
     has_gaps: bool = True
+    """Whether the bus arbitrates with gaps, as up to S400. Without gaps all times are lower bounds."""
 
 
 class Gaps(NamedTuple):
-    """The gaps of a bus [us], and whether a single node answers on it."""
+    """Gaps of a bus [us], and whether a single node answers on it."""
 
     subaction_us: Number
-    """T_sub."""
+    """T_sub, equation (10)."""
     arbitration_reset_us: Number
-    """T_reset."""
+    """T_reset, equation (10)."""
     both_us: Number
     """T_sum, equation (10)."""
     alone: Number
-    """Whether there is a single node: a boolean, or an array of booleans."""
+    """Whether a single node answers: a boolean, or an array of booleans."""
 
 
 class Delays(NamedTuple):
-    """Delays over a link that do not depend on the packet [us]."""
+    """Delays over a link that are the same for every packet [us]."""
 
     link: Link
     clock_mbit_s: Number
-    """Clock of gaps and PHY delays [Mbit/s]."""
+    """Clock that gaps and PHY delays are counted in [Mbit/s]."""
     gaps: Gaps
     hop_us: Number
     arbitration_us: Number
@@ -88,7 +76,7 @@ class Delays(NamedTuple):
         )
 
     def over(self, hops: Number) -> "Delays":
-        """The delays over other hops of the same bus."""
+        """These delays over another number of hops of the same bus."""
         if self.link.has_gaps:
             arbitration_us = equations.arbitration_phase_us(
                 hops, hop_us=self.hop_us, gap_count=self.link.gap_count, gap_clock_mbit_s=self.clock_mbit_s
@@ -106,22 +94,15 @@ class Delays(NamedTuple):
 
 
 def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Delays:
-    """Arbitration, acknowledge, gaps of any transaction, equations (4), (6), (9), (10); lower bounds without gaps.
+    """Delays and gaps of any transaction, equations (4), (6), (9), (10); lower bounds without gaps.
 
-    Parameters
-    ----------
-    link
-        Rate, gap count and distance.
-    model
-        Timing model.
-    alone
-        Whether a single node answers on the bus.
+    `alone` tells whether a single node answers on the bus.
     """
     rate_mbit_s, gap_count = link.data_rate_mbit_s, link.gap_count
     if not link.has_gaps:
         beta_phy_us = c.BETA_PHY_DELAY_US if link.phy_delay_us is None else link.phy_delay_us
         hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us)
-        # The next packet need not wait until all nodes have one: only the way to a node and back is surely waited for.
+        # Not every node need have a packet before the next one: only the way to a node and back is surely waited for.
         return Delays(link, rate_mbit_s, Gaps(0.0, 0.0, 0.0, alone), hop_us, 0.0, 0.0, 0).over(0)
     clock_mbit_s = rate_mbit_s if model == "paper" else c.BASE_RATE_MBIT_S
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
@@ -136,56 +117,38 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
 
 
 class Responder(NamedTuple):
-    """Answer of a node to a transaction, and the host's time after it.
-
-    Parameters
-    ----------
-    execution_us
-        Execution time T_exec of a split transaction [us].
-    answer
-        Way in which the node answers.
-    worst_extra_us
-        Time of the slowest execution beyond T_exec [us].
-    hold_us
-        Time from the acknowledge to a concatenated response [us]; the bus stays busy.
-    host_us
-        The host's own time between a response and its next request [us].
-    """
+    """Answer of a node to a transaction, and the host's time after it."""
 
     execution_us: Number
+    """Execution time T_exec of a split transaction [us]."""
     answer: Answer = "split"
     worst_extra_us: Number = 0.0
+    """Time of the slowest execution beyond T_exec [us]."""
     hold_us: Number = 0.0
+    """Time from the acknowledge to a concatenated response, while the bus stays busy [us]."""
     host_us: Number = 0.0
+    """The host's own time between a response and its next request [us]."""
 
 
 class IdleTime(NamedTuple):
-    """Idle bus around a transaction, without the execution [us]."""
+    """Idle bus around a transaction, execution not counted [us]."""
 
     idle_us: Number
     """Idle bus of the gaps."""
     host_us: Number
-    """Idle bus while the host takes longer than the gaps."""
+    """Idle bus beyond the gaps, while the host is not ready."""
 
     @property
     def us(self) -> Number:
-        """Both together."""
+        """Gaps and host together."""
         return self.idle_us + self.host_us
 
 
 def idle_time(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> IdleTime:
-    """Idle bus of a transaction as the bus runs it: its gaps are thresholds of idle periods.
+    """Idle bus of a transaction, with gaps as thresholds of idle periods.
 
-    Parameters
-    ----------
-    answer
-        How the node answers.
-    gaps
-        The gaps.
-    execution_us
-        Upper bound of the execution time of a split transaction [us]; of any sort.
-    host_us
-        The host's own time between a response and its next request [us]; of any sort.
+    `execution_us` is an upper bound of the execution time of a split transaction [us], and `host_us` the host's own
+    time between a response and its next request [us].
 
     Examples
     --------
@@ -212,11 +175,6 @@ def between_packets_us(answer: Answer, *, gaps: Gaps, execution_us: Number, host
     A split transaction has two idle periods, before and after its response. A fast node ends the first before the
     arbitration reset gap has passed; then the second must be as long as that gap. A single node on the bus may have
     used its turn in the fairness interval; then the first must be as long.
-
-    Parameters
-    ----------
-    answer, gaps, execution_us, host_us
-        As in `idle_time`.
     """
     sub_us, reset_us = gaps.subaction_us, gaps.arbitration_reset_us
     if answer != "split":
@@ -242,19 +200,20 @@ def _packet_bytes(kind: TransactionKind, payload_bytes: Number) -> tuple[Number,
 
 
 class Phases(NamedTuple):
-    """Every phase of a transaction [us], in the order of `busplan.buses.ieee1394.figures`, with the equation of each.
+    """Phases of a transaction [us], in the order of `busplan.buses.ieee1394.figures`.
 
-    Phases that the answer does not have are 0: a unified answer has no response, only a split answer an execution time.
+    Phases that the answer does not have are 0: a unified answer has no response, and only a split answer has an
+    execution time.
     """
 
     request_bytes: Number
     response_bytes: Number
     arbitration_us: Number
-    """Arbitration of a packet that arbitrates."""
+    """Arbitration of one packet that arbitrates."""
     request_data_us: Number
     response_data_us: Number
     acknowledge_us: Number
-    """Acknowledge of a packet that is acknowledged."""
+    """Acknowledge of one packet that is acknowledged."""
     request_us: Number
     response_us: Number
     request_and_acknowledge_us: Number
@@ -273,7 +232,7 @@ class Phases(NamedTuple):
     idle_us: Number
     host_us: Number
     transaction_us: Number
-    """Time of the transaction in the cycle."""
+    """Time that the transaction takes of the cycle."""
 
 
 def transaction(
@@ -285,27 +244,10 @@ def transaction(
     responder: Responder,
     overhead_bytes: Number = 0,
 ) -> Phases:
-    """Take an asynchronous transaction apart, equations (3)-(10) and (12)-(15).
+    """Phases of an asynchronous transaction, equations (3)-(10) and (12)-(15).
 
-    Parameters
-    ----------
-    kind
-        "read" or "write".
-    model
-        Timing model.
-    delays
-        Delays over the link, by the same model.
-    payload_bytes
-        Payload [bytes]; integer or integer array.
-    responder
-        How the node answers, and how fast the host goes on.
-    overhead_bytes
-        Overhead of each packet in the `paper` model [bytes]; `standard` knows the real sizes.
-
-    Returns
-    -------
-    Phases
-        All phases [us], in the broadcast shape of the arguments.
+    `overhead_bytes` are those of each packet in the `paper` model; `standard` knows the real sizes. Arrays give phases
+    in their broadcast shape.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The settings of a bus that its packets meet, and the transactions of the individual schedule."""
+"""Settings of the bus that its packets depend on, and the transactions of the individual schedule."""
 
 from collections.abc import Iterator
 from typing import Final, NamedTuple
@@ -12,17 +12,17 @@ from busplan.sections.base import TransactionKind
 
 
 def is_broadcast(network: Network) -> bool:
-    """Whether the nodes broadcast their data, instead of being read in turn."""
+    """Whether the nodes broadcast their data instead of being read in turn."""
     schedule: str = network.profile.cycle.schedule
     return schedule == "broadcast"
 
 
 @step("H", "hops")
 def hops_of(network: Network) -> Number:
-    """Most cable hops [1].
+    """Largest number of cable hops [1].
 
-    In a chain they lie between the host and the farthest node. In a tree they are `max_hops`, which the host's own way
-    to a node never exceeds.
+    In a chain they lie between the host and the farthest node. In a tree they are `max_hops`, which the path from the
+    host to a node never exceeds.
     """
     most: Number | None = network.profile.bus.max_hops
     return worded(network.nodes, "N: a chain with the host at its end") if most is None else most
@@ -35,13 +35,13 @@ def has_gaps(network: Network) -> bool:
 
 @step("g_safe", "safe_gap_count")
 def safe_gap_count_of(network: Network) -> Number:
-    """Smallest safe gap count for the hops; 0 without gaps [1]."""
+    """Smallest safe gap count for the hops [1]; 0 without gaps."""
     return safe_gap_count(hops_of(network)) if has_gaps(network) else 0
 
 
 @step("g", "gap_count")
 def gap_count_of(network: Network) -> Number:
-    """Gap count in force; 0 without gaps [1]."""
+    """Gap count in force [1]; 0 without gaps."""
     if not has_gaps(network):
         return 0
     given: Number | str = network.profile.bus.gap_count
@@ -51,7 +51,7 @@ def gap_count_of(network: Network) -> Number:
 
 
 def link_of(network: Network) -> Link:
-    """Rate, gap count and distance of the farthest node."""
+    """Link to the farthest node: rate, gap count and hops."""
     bus = network.profile.bus
     return Link(
         data_rate_mbit_s=c.by_key("DATA_RATE_MBIT_S")[bus.speed],
@@ -64,9 +64,9 @@ def link_of(network: Network) -> Link:
 
 
 def charges_own_hops(network: Network) -> bool:
-    """Whether each node is charged its own way, and not that to the farthest, as a broadcast is: it goes to all.
+    """Whether each node is charged its own hops, not those of the farthest; a broadcast goes to all nodes.
 
-    A lower bound has no longer way than a node's own.
+    A lower bound counts no more hops than a node's own.
     """
     is_own = network.profile.bus.charge_hops == "own" or not has_gaps(network)
     return is_own and not is_broadcast(network)
@@ -77,16 +77,16 @@ class GroupHops(NamedTuple):
 
     first: Number
     mean: Number
-    """Times are linear in the hops, so the mean gives their sum."""
+    """Mean hops: times are linear in the hops, so `nodes` times the mean is the group's sum."""
     last: Number
 
     def of_node(self, place: Number) -> Number:
-        """Hops of the node at a place in its group, from 0; at the mean place the mean hops."""
+        """Hops of the node at a place in its group, counted from 0; at the mean place the mean hops [1]."""
         return self.first if self.first is self.last else self.first + place
 
 
 def group_hops(network: Network) -> tuple[GroupHops, ...]:
-    """Hops of each group's nodes: in a chain their place in it, in a tree what the group says, or else 1."""
+    """Hops of each group [1]: in a chain the places of its nodes, in a tree the group's `hops`, else 1."""
     if network.profile.bus.max_hops is not None:
         return tuple(GroupHops(*(getattr(group.node, "hops", None) or 1,) * 3) for group in network.groups)
     chain: list[GroupHops] = []
@@ -101,24 +101,24 @@ def group_hops(network: Network) -> tuple[GroupHops, ...]:
 
 
 def answers_split(group: Group) -> bool:
-    """Whether nodes of a group answer reads or writes split: only then is their execution on the bus."""
+    """Whether a group answers reads or writes split: only then is the execution of its nodes on the bus."""
     return "split" in (group.node.read_response, group.node.write_response)
 
 
 class Exchange(NamedTuple):
-    """The same transaction with each node of a group."""
+    """One transaction that is made with each node of a group."""
 
     kind: TransactionKind
     group: Group
     delays: Delays
-    """Delays that are charged, of the group's nodes on the mean."""
+    """Delays that are charged, for the mean node of the group."""
     payload_bytes: Number
     responder: Responder
     execution_uncertainty_us: Number
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
     parts: tuple[BusEvent, ...]
-    """Parts of the transaction in the order of the wire, without those that the answer does not have.
+    """Parts of the transaction in the order of the wire; parts that its answer does not have are left out.
 
     The idle bus of the gaps is a single part here; `events` divides it.
     """
@@ -127,21 +127,7 @@ class Exchange(NamedTuple):
 def exchange(
     network: Network, group: Group, kind: TransactionKind, *, model: TimingModelName, delays: Delays
 ) -> Exchange:
-    """Take the transaction of a group apart.
-
-    Parameters
-    ----------
-    network
-        The network.
-    group
-        One of its groups.
-    kind
-        "read" or "write".
-    model
-        Timing model.
-    delays
-        Delays over the way of the packets.
-    """
+    """The transaction `kind` of a group, taken apart into its phases."""
     is_read, node = kind == "read", group.node
     answer: Answer = node.read_response if is_read else node.write_response
     payload_bytes = group.read_bytes if is_read else group.write_bytes
@@ -167,7 +153,7 @@ def exchange(
 
 ARBITRATION: Final = "cycle_arbitration_us"
 PACKET_PARTS: Final = (ARBITRATION, "cycle_data_us", "cycle_acknowledge_us")
-"""Terms whose parts are the way of a packet over the hops."""
+"""Terms whose parts are charged the hops of a packet."""
 
 
 def _parts(kind: TransactionKind, phases: Phases, answer: Answer) -> Iterator[BusEvent]:
@@ -192,7 +178,7 @@ def _parts(kind: TransactionKind, phases: Phases, answer: Answer) -> Iterator[Bu
 
 
 def events(exchanged: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
-    """The parts of a transaction, of plain numbers; its idle bus is divided by idle period and gap."""
+    """Events of a transaction, in plain numbers; its idle bus is divided into idle periods and gaps."""
     before, behind = _idle_periods(exchanged, model)
     for part in exchanged.parts:
         if part.kind == "idle":
@@ -204,11 +190,11 @@ def events(exchanged: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]
 
 
 _ROUNDING_US: Final = 1e-9
-"""A difference of times below this is the rounding of floats."""
+"""Differences of times below this are rounding of floats."""
 
 
 def _idle_periods(exchanged: Exchange, model: TimingModelName) -> tuple[list[BusEvent], list[BusEvent]]:
-    """Idle bus before the response of a transaction, and after it: gaps, and the allowance for a faster node."""
+    """Idle bus before the response of a transaction, and after it: gaps and the allowance for a faster node."""
     phases = exchanged.phases
     sub_us, reset_us = phases.subaction_gap_us, phases.arbitration_reset_gap_us
     idle_us = phases.idle_us
@@ -226,7 +212,7 @@ def _idle_periods(exchanged: Exchange, model: TimingModelName) -> tuple[list[Bus
     execution_us = phases.execution_us + phases.worst_extra_us
     before_us = max(sub_us - execution_us, 0.0)
     behind_us = idle_us - before_us
-    # A response that comes after the arbitration reset gap leaves a subaction gap to wait for.
+    # A response later than the arbitration reset gap is followed by a subaction gap alone.
     is_late = execution_us > reset_us
     allowance_us = behind_us - (sub_us if is_late else reset_us)
     allowance_us = allowance_us if allowance_us > _ROUNDING_US else 0.0

@@ -1,4 +1,4 @@
-"""The cycle of a polled bus: request, turn-around, answer, next."""
+"""The cycle of a polled bus: request, turn-around and answer of each node."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, reduce
@@ -61,7 +61,7 @@ _BY_CLOCK: Final = (
     "cycle_gap_us",
     "cycle_retry_us",
 )
-"""Terms that the clocks of the bit rate time, beside the turn-around without the nodes' own time."""
+"""Terms timed by the clocks of the bit rate; of the turn-around they time all but the nodes' own time."""
 FIGURES: Final = BusFigures(TERMS, setup=(RATE,), headings=(RATE.key,))
 EVENTS: Final = (
     EventKind("once", "token and GAP", _WIRE, "t", "sync"),
@@ -114,30 +114,30 @@ class PolledCycle(BusCycle):
 
     @property
     def way(self) -> Requests:
-        """How nodes are asked."""
+        """The way that nodes are asked."""
         way: Requests = self.network.profile.bus.requests or self._protocol.requests[0]
         return way
 
     @cached_property
     def _turn_us(self) -> Number:
-        """Wait for an answer: the middle of typical and longest, to which U reaches on both sides [us]."""
+        """Wait for an answer [us]: the middle of typical and longest, so that U reaches both."""
         between = self._times
         is_exact = self.is_typical or between.longest_turn is between.typical_turn
         return between.typical_turn if is_exact else (between.typical_turn + between.longest_turn) / 2
 
     @property
     def _clock_tolerance(self) -> Number:
-        """Largest error of the bit rate, a share of it."""
+        """Largest error of the bit rate, as a share of it [1]."""
         given: Number | None = self.network.profile.bus.clock_tolerance
         return self._protocol.clock_tolerance if given is None else given
 
     def _wire_us(self, size: Number) -> Number:
-        """Time of a telegram of a size [us]."""
+        """Time of a telegram of `size` bytes [us]."""
         us: Number = size * self._protocol.bits_per_byte * 1000 / self.network.profile.bus.bit_rate_kbit_s
         return us
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """Token, broadcast, reads, the host, writes, repeated requests, and the window for the rest."""
+        """Token, broadcast, reads, the host, writes, repeated requests, and the non-periodic window."""
         bus, groups = self.network.profile.bus, tuple(enumerate(self.network.groups))
         yield BusEvent("once", "cycle_once_us", self._times.once, "token and GAP")
         if bus.global_control:
@@ -159,7 +159,7 @@ class PolledCycle(BusCycle):
 
     @property
     def _retry_us(self) -> Number:
-        """Requests of the longest kind that nobody answers, each with its timeout [us]."""
+        """Time of repeated requests: the longest kind of request, without an answer, each with its timeout [us]."""
         retries: Number = self.network.profile.bus.retries
         if is_off(retries):
             return 0.0
@@ -186,7 +186,7 @@ class PolledCycle(BusCycle):
         return self._protocol.data_bytes(size, self._times_a_cycle(kind))
 
     def _execution_us(self, kind: str, group: Group) -> Number:
-        """Own time of a node before it answers; 0 where it answers from a buffer [us]."""
+        """Own time of a node before it answers [us]; 0 where it answers from a buffer."""
         if self._protocol.is_buffered:
             return 0.0
         read_us, write_us = group.read_execution_us, group.write_execution_us
@@ -212,7 +212,7 @@ class PolledCycle(BusCycle):
         )
 
     def _single(self, kind: Literal["exchange", "read", "write"], place: int, group: Group) -> Run:
-        """A request for each node."""
+        """One request for each node of a group."""
         protocol, rounds = self._protocol, group.nodes
         if kind == "exchange":
             request: Number = protocol.exchange_request_bytes + protocol.data_bytes(group.write_bytes)
@@ -228,7 +228,7 @@ class PolledCycle(BusCycle):
         return Run(self._around(kind, sent, *answers, is_answered=bool(answers)), rounds, place)
 
     def _sync(self, kind: TransactionKind, place: int, group: Group) -> Iterator[Run]:
-        """One request for all nodes of a group: all answer in turn to a read, none to a write."""
+        """One request for all nodes of a group: all answer a read in turn, and none answers a write."""
         protocol, data = self._protocol, self._data(kind, group)
         size: Number = protocol.sync_read_bytes if kind == "read" else protocol.sync_write_bytes
         size = size + group.nodes * (protocol.sync_node_bytes + (0 if kind == "read" else data))
@@ -244,7 +244,7 @@ class PolledCycle(BusCycle):
         yield Run(tuple(after), rounds)
 
     def _answers(self, group: Group, kind: str) -> Number:
-        """Answers of a group's nodes to requests of a kind in a cycle [1]."""
+        """Number of answers of a group's nodes in a cycle to requests of a kind [1]."""
         if self.way == "exchange":
             return group.nodes if kind == "read" else 0
         if kind == "read":
@@ -253,7 +253,7 @@ class PolledCycle(BusCycle):
         return group.nodes * self._times_a_cycle("write") if is_answered else 0
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """Turn-around and clocks, of all nodes together; the adapter; and the nodes' own time.
+        """Doubts of turn-around and clocks, for all nodes together; of the adapter; and of the nodes' own time.
 
         The clocks of master and nodes count as one: a divider errs alike in all UARTs of a type.
         """
@@ -288,5 +288,5 @@ class PolledCycle(BusCycle):
         return {RATE.key: self.network.profile.bus.bit_rate_kbit_s}
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """In an exchange the command goes before the feedback: it rests on that of the cycle before."""
+        """Periods inside a loop [1]: one more in an exchange, whose command uses the last cycle's feedback."""
         return int(at_sync) + int(self.way == "exchange")

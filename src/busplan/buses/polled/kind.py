@@ -1,4 +1,4 @@
-"""Polled buses, as a kind of bus."""
+"""Polled buses as a kind of bus."""
 
 from collections.abc import Mapping
 from functools import reduce
@@ -24,7 +24,7 @@ from busplan.elementwise import Number, larger
 
 
 def _largest_bytes(network: Network) -> Number:
-    """The most data of a telegram for one node [bytes]."""
+    """Most data of a telegram for one node [bytes]."""
     bus, protocol = network.profile.bus, protocol_of(network.profile.bus)
     reads, writes = (1, 1) if PolledCycle(network, STANDARD).way == "exchange" else (bus.reads, bus.writes)
     sizes = (
@@ -64,7 +64,7 @@ _SECTIONS: Final = {
     table.lower(): f'[bus]\nkind = "polled"\nprotocol = "{words["name"]}"\n{words["start"]}'
     for table, words in c.beside.items()
 }
-"""Section [bus] of a new profile, by what `init` calls it."""
+"""Section [bus] of a new profile, by the name of its variant in `init`."""
 
 
 class Polled(Bus):
@@ -104,23 +104,23 @@ class Polled(Bus):
     evidence_data = ("polled",)
 
     def title_of(self, network: Network) -> str:
-        """Name of the protocol; of one of the user's own, that of the kind."""
+        """Name of the protocol; for a protocol of the user's own, the name of the kind."""
         return next(iter(protocol_of(network.profile.bus).called), self.title)
 
     def evidence_for(self, network: Network) -> tuple[str, ...]:
-        """The measured rates are of servos of one protocol."""
+        """Evidence data for the network: the measured rates are of servos of one protocol."""
         return tuple(protocol_of(network.profile.bus).evidence)
 
     def cycle(self, network: Network, *, model: str) -> PolledCycle:
-        """The cycle of a network under a timing model."""
+        """Cycle of a network under a timing model."""
         return PolledCycle(network, model)
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - as the cycle
-        """Nodes that answer from a buffer execute beside the telegrams."""
+        """Whether the cycle contains execution: nodes that answer from a buffer execute beside the telegrams."""
         return not protocol_of(network.profile.bus).is_buffered
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """The return delay, another bit rate, and another way to ask."""
+        """Settings to try: the return delay, another bit rate, and another way to ask."""
         bus, protocol = network.profile.bus, protocol_of(network.profile.bus)
         delay_us = protocol.return_delay_us if bus.return_delay_us is None else bus.return_delay_us
         way = PolledCycle(network, STANDARD).way
@@ -136,7 +136,7 @@ class Polled(Bus):
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A slower adapter, and one request more that is repeated."""
+        """Perturbations: a slower adapter, and one more repeated request."""
         bus = network.profile.bus
         no_timeout = "" if protocol_of(bus).has_token or bus.timeout_us is not None else "bus.timeout_us is not given"
         return (
@@ -145,11 +145,11 @@ class Polled(Bus):
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Payloads of whole bytes that a telegram holds."""
+        """Payloads in whole bytes, up to what a telegram holds."""
         return PayloadRange(1, int(protocol_of(network.profile.bus).max_bytes), carrier="a telegram")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """Protocol, bit rate, and how nodes are asked."""
+        """Words for the protocol, the bit rate, and the way that nodes are asked."""
         bus, way = network.profile.bus, PolledCycle(network, STANDARD).way
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
         asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]

@@ -1,4 +1,4 @@
-"""Protocols of polled buses: what a telegram has beside its data, and the times between telegrams."""
+"""Protocols of polled buses: sizes of telegrams without data, and times between telegrams."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -15,20 +15,20 @@ c: Final = Constants(
         *("is_buffered", "is_stuffed", "has_token", "has_arbiter"),
     ),
 )
-"""Constants with a source, by their names here."""
+"""Constants with a source, by their names."""
 PROTOCOLS: Final = MappingProxyType({words["name"]: table for table, words in c.beside.items()})
-"""Table of the constants of each protocol, by its name in a profile."""
+"""Table of the constants of each protocol, by the protocol's name in a profile."""
 _RATE_STEPS_KBIT_S: Final = (187.5, 500, 1500, 3000, 6000)
 """Highest bit rate of each column but the last of PROFIBUS' time ratios [kbit/s]."""
 UNLIMITED: Final = 1_000_000
-"""Nodes, and data of a telegram, of a protocol that limits neither."""
+"""Number of nodes, and data bytes of a telegram, of a protocol that limits neither."""
 UNLIMITED_KBIT_S: Final = 1e9
 
 Requests = Literal["exchange", "sync", "single"]
 
 
 class ProtocolFigures(NamedTuple):
-    """A serial protocol; a size is without data, 0 for no such telegram. The numbers may be of any sort."""
+    """A serial protocol; floats, arrays or traced numbers. A size is without data; 0 means no such telegram."""
 
     bits_per_byte: Number
     clock_tolerance: Number
@@ -53,11 +53,11 @@ class ProtocolFigures(NamedTuple):
     max_bytes: Number = UNLIMITED
     max_bit_rate_kbit_s: Number = UNLIMITED_KBIT_S
     called: tuple[str, ...] = ()
-    """What users call it, its title first; none of a user's own."""
+    """Names that users give the protocol, its title first; none for a protocol of the user's own."""
     rates: Mapping[str, Any] = MappingProxyType({"kbit_s": ()})
     """Usual bit rates, for plans, with grade and source."""
     evidence: tuple[str, ...] = ()
-    """Data that its figures are checked against."""
+    """Data files that its figures are checked against."""
     is_buffered: bool = False
     """Whether nodes answer from a buffer: their execution runs beside the telegrams."""
     is_stuffed: bool = False
@@ -69,7 +69,7 @@ class ProtocolFigures(NamedTuple):
 
     @property
     def requests(self) -> tuple[Requests, ...]:
-        """The ways to ask that it has, the fastest first."""
+        """Ways in which nodes can be asked, the fastest first."""
         ways: dict[Requests, Number] = {
             "exchange": self.exchange_request_bytes,
             "sync": self.sync_read_bytes,
@@ -78,19 +78,19 @@ class ProtocolFigures(NamedTuple):
         return tuple(way for way, size in ways.items() if not is_everywhere(size <= 0))
 
     def data_bytes(self, size: Number, requests: Number = 1) -> Number:
-        """Data of a telegram where some share data of a size: whole words, the mean of the telegrams [bytes]."""
+        """Data of a telegram when `requests` share `size` bytes [bytes]: whole words, the mean of the telegrams."""
         if not is_everywhere(self.word_bytes <= 1):
             size = rounded_up(size / self.word_bytes) * self.word_bytes
         return size / requests
 
     def most_data_bytes(self, size: Number, requests: Number) -> Number:
-        """The same of the largest of these telegrams [bytes]."""
+        """Data of the largest telegram when `requests` share `size` bytes [bytes]."""
         return rounded_up(size / (self.word_bytes * requests)) * self.word_bytes
 
 
 @cached(maxsize=16)
 def _shipped(name: str) -> ProtocolFigures:
-    """A protocol of the constants, whose values keep their sources."""
+    """A shipped protocol of the constants, whose values keep their sources."""
     table = PROTOCOLS[name]
     values: Any = {key.lower(): value for key, value in c.by_key(table).items()} | c.beside[table]
     known = {key: values[key] for key in ProtocolFigures._fields if key in values}
@@ -98,7 +98,7 @@ def _shipped(name: str) -> ProtocolFigures:
 
 
 def protocol_of(bus: Any) -> ProtocolFigures:
-    """The protocol of a section [bus]."""
+    """Protocol of a section [bus]."""
     return _shipped(bus.protocol) if isinstance(bus.protocol, str) else ProtocolFigures(**vars(bus.protocol))
 
 
@@ -108,9 +108,9 @@ class Times(NamedTuple):
     before: Number
     """Idle bus before each request."""
     typical_turn: Number
-    """Wait for an answer, the node's own time left out: of a typical node, or the shortest."""
+    """Wait for an answer, without the node's own time: of a typical node, or the shortest."""
     longest_turn: Number
-    """The longest."""
+    """Longest wait for an answer, without the node's own time."""
     after: Number
     """Idle bus after an answer."""
     silent: Number
@@ -118,7 +118,7 @@ class Times(NamedTuple):
     once: Number
     """Token and GAP of PROFIBUS, once a cycle."""
     timeout: Number
-    """How long the master waits for an answer that does not come."""
+    """Wait of the master for an answer that does not come."""
 
 
 def times(network: Network) -> Times:
@@ -140,15 +140,15 @@ def times(network: Network) -> Times:
 
 
 def _bits_us(bits: Number, bit_us: Number) -> Number:
-    """Time of some bits, 0.0 of none [us]."""
+    """Time of some bits [us]; 0.0 for none."""
     return 0.0 if is_off(bits) else bits * bit_us
 
 
 def _profibus(bus: Any, bit_us: Number) -> Times:
     """Times of PROFIBUS DP: T_SYN, T_SDR, T_ID1 = 35 + 2 T_SET + T_QUI, T_ID2 = max(T_ID1, max T_SDR) [us].
 
-    Once a cycle the master passes the token to itself, T_SYN + token + T_ID2, and asks an address of the GAP that
-    nobody has, T_SYN + SD1 + T_SL (Felser, PROFIBUS manual, calculation for single masters).
+    Once a cycle the master passes the token to itself, T_SYN + token + T_ID2, and asks an unused address of the GAP,
+    T_SYN + SD1 + T_SL (Felser, PROFIBUS manual, calculation for single masters).
     """
     own = c.by_key("PROFIBUS")
     place = total(choose(bus.bit_rate_kbit_s > step, 1, 0) for step in _RATE_STEPS_KBIT_S)

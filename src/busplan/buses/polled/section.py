@@ -1,4 +1,4 @@
-"""The keys that only profiles of polled buses have, in [bus]."""
+"""Keys of [bus] that only polled buses have."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Final, Literal

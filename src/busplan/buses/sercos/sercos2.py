@@ -1,4 +1,4 @@
-"""SERCOS I and II: sourced figures, the length of telegrams, and the cycle."""
+"""SERCOS I and II: sourced figures, lengths of telegrams, and the cycle."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -16,28 +16,19 @@ DataRate = Literal[2, 4, 8, 16]
 """Data rates [Mbit/s]."""
 
 c: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos2.toml")
-"""Constants with a source, by their names here."""
+"""Constants with a source, by their names."""
 
 _STEP_US: Final = 1000
 _LONGEST_US: Final = 65_000
 PERIODS: Final = Periods((62.5, 125.0, 250.0, 500.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
-"""Communication periods: sercos.com, cycle times; the longest by Rexroth."""
+"""Communication periods [us], from sercos.com, cycle times; the longest from Rexroth."""
 
 
 def telegram_bits(data_bytes: Number, *, is_stuffed: bool) -> Number:
-    """Length of a telegram with its flags.
+    """Length of a telegram with its flags [bits].
 
-    Parameters
-    ----------
-    data_bytes
-        Data of the telegram s [bytes]; float or array.
-    is_stuffed
-        Whether the stuff bits of the worst case are counted, floor(8 (s + 3) / 5), or none.
-
-    Returns
-    -------
-    float
-        16 + 8 (s + 3) bits and the stuff bits [bits]; the shape of the argument.
+    16 + 8 (s + 3) bits for s data bytes, and with `is_stuffed` the stuff bits of the worst case, floor(8 (s + 3) / 5).
+    Floats and arrays are taken.
 
     Examples
     --------
@@ -50,14 +41,7 @@ def telegram_bits(data_bytes: Number, *, is_stuffed: bool) -> Number:
 
 
 def telegram_us(data_bytes: Number, *, data_rate_mbit_s: Number, is_stuffed: bool) -> Number:
-    """Time of a telegram on the ring [us].
-
-    Parameters
-    ----------
-    data_bytes, is_stuffed
-        As `telegram_bits` takes them.
-    data_rate_mbit_s
-        Data rate [Mbit/s]; float or array.
+    """Time of a telegram on the ring [us]; see `telegram_bits`.
 
     Examples
     --------
@@ -68,7 +52,7 @@ def telegram_us(data_bytes: Number, *, data_rate_mbit_s: Number, is_stuffed: boo
 
 
 def start_us(data_rate_mbit_s: Number) -> Number:
-    """From MST to the first AT, where the drives say no other time [us].
+    """Time from MST to the first AT, where the drives give no other time [us].
 
     Examples
     --------
@@ -129,12 +113,12 @@ EVENTS: Final = (
     EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
-"""Kinds of events, in the order of the cycle."""
+"""Kinds of events in the order of the cycle."""
 STRETCHES: Final = (
     EventKind("at_stretch", "AT", "", "A", "in"),
     EventKind("mdt_stretch", "MDT", "", "M", "out"),
 )
-"""Stretches that several events make together."""
+"""Kinds of stretches, each a sequence of events."""
 
 
 PREMISES: Final = (
@@ -163,12 +147,12 @@ class Sercos2Cycle(SercosCycle):
     @cached_property
     @step("s_MDT")
     def mdt_bytes(self) -> Number:
-        """Data of the MDT, a record for each drive [bytes]."""
+        """Data of the MDT, one record for each drive [bytes]."""
         return total((word_bytes(group.write_bytes) + c.RECORD_BYTES) * group.nodes for group in self.network.groups)
 
     @cached_property
     def start_us(self) -> Number:
-        """From MST to the first AT [us]."""
+        """Time from MST to the first AT [us]."""
         bus = self.network.profile.bus
         given_us: Number | None = bus.at_start_us
         return start_us(bus.data_rate_mbit_s) if given_us is None else given_us
@@ -191,16 +175,16 @@ class Sercos2Cycle(SercosCycle):
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The gap between two drives, which is the same in the whole cycle."""
+        """Doubt of the gap between two drives, which is the same in the whole cycle."""
         return (Doubt("bus.at_gap_us", "gap between two drives", self.by_term["cycle_gap_us"] * c.GAP_SHARE),)
 
     def figures(self) -> Mapping[str, Number | None]:
-        """The data rate, and the data of the MDT."""
+        """Data rate, and data of the MDT."""
         return {"data_rate_mbit_s": self.network.profile.bus.data_rate_mbit_s, "mdt_bytes": self.mdt_bytes}
 
     @property
     def feedback_due_us(self) -> Number:
-        """Feedback is that of the start of MST [us]."""
+        """Time by which feedback must be ready [us]: 0, the start of MST."""
         return 0.0
 
     def latencies(self) -> tuple[BusLatency, ...]:
@@ -212,7 +196,7 @@ class Sercos2Cycle(SercosCycle):
         return delays(self.network, feedback_us=(before_us, ats_us), command_us=(turned_us, sent["cycle_mdt_us"]))
 
     def _records(self, mdt_us: float) -> Iterator[BusEvent]:
-        """The record of each drive, then all else of the MDT: flags, address, check sequence and stuff bits."""
+        """Record of each drive, then the rest of the MDT: flags, address, check sequence and stuff bits."""
         rate, records_us, node = self.network.profile.bus.data_rate_mbit_s, 0.0, 0
         for group in self.network.groups:
             record_us = 8 * (word_bytes(group.write_bytes) + c.RECORD_BYTES) / rate

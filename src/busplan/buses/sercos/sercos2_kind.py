@@ -1,4 +1,4 @@
-"""SERCOS I and II, as a kind of bus."""
+"""SERCOS I and II as a kind of bus."""
 
 from collections.abc import Mapping
 from typing import ClassVar, Final
@@ -43,7 +43,7 @@ LIMITS: Final = (
 
 
 class Sercos2(SercosBus):
-    """SERCOS I and II, whose drives answer in turn, and get their commands in a single telegram."""
+    """SERCOS I and II, whose drives answer in turn and get their commands in a single telegram."""
 
     kind = "sercos2"
     title = "SERCOS I and II"
@@ -78,11 +78,11 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     evidence_data = ("sercos2",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
-        """The cycle of a network under a timing model."""
+        """Cycle of a network under a timing model."""
         return Sercos2Cycle(network, model)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A longer gap, and the fastest ring."""
+        """Perturbations: a longer gap, and the fastest ring."""
         bus = network.profile.bus
         fastest = "it is the fastest already" if bus.data_rate_mbit_s == _FASTEST else ""
         return (
@@ -91,12 +91,12 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Payloads of whole words, as many as a drive can be told to send for each of its axes."""
+        """Payloads in whole words, up to what a drive can be told to send for each of its axes."""
         axes = min((int(group.axes) for group in network.groups), default=1)
         return PayloadRange(int(c.WORD_BYTES), int(c.MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """The data rate and the gap."""
+        """Words for the data rate and the gap."""
         bus = network.profile.bus
         return (f"{bus.data_rate_mbit_s} Mbit/s", f"gap of {bus.at_gap_us:g} us between two drives (assumed)")
 

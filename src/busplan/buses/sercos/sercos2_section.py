@@ -1,4 +1,4 @@
-"""The keys that only profiles of SERCOS I and II have, in [bus]."""
+"""Keys of [bus] that only SERCOS I and II have."""
 
 from typing import Annotated, Final, Literal
 

@@ -17,7 +17,7 @@ TimingMethod = Literal["mdt-at-ucc", "mdt-ucc-at", "at-last"]
 HotPlug = Literal["first", "all"]
 
 c: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos3.toml")
-"""Constants with a source, by their names here."""
+"""Constants with a source, by their names."""
 c.computed("DEVICE_DELAY_SHARE", lambda c: (c.DEVICE_DELAY_US - 0.5) / sqrt(12) / c.DEVICE_DELAY_US)
 c.computed("MASTER_JITTER_SHARE", lambda c: 1 / sqrt(12) / c.MASTER_JITTER_US)
 c.computed("GAP_SHARE", lambda c: (c.DEFAULT_GAP_BYTES - c.LEAST_GAP_BYTES) / sqrt(12) / c.DEFAULT_GAP_BYTES)
@@ -25,11 +25,11 @@ c.computed("GAP_SHARE", lambda c: (c.DEFAULT_GAP_BYTES - c.LEAST_GAP_BYTES) / sq
 _STEP_US: Final = 250
 _LONGEST_US: Final = 65_000
 PERIODS: Final = Periods((31.25, 62.5, 125.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
-"""Communication periods, CSMD_TSCYC of CoSeMa."""
+"""Communication periods [us], CSMD_TSCYC of CoSeMa."""
 
 
 class Items(NamedTuple):
-    """Some pieces of data that are not split. The numbers may be of any sort."""
+    """Pieces of data of one size, each of which stays whole; floats, arrays or traced numbers."""
 
     pieces: Number
     """Number of pieces [1]."""
@@ -38,23 +38,23 @@ class Items(NamedTuple):
 
 
 class Filling(NamedTuple):
-    """Telegrams of one sort that are filled, the last of them open. The numbers may be of any sort."""
+    """Filled telegrams of one sort, the last of them open; floats, arrays or traced numbers."""
 
     telegrams: Number
-    """Number of telegrams, with the open one [1]."""
+    """Number of telegrams, the open one included [1]."""
     closed_bytes: Number
     """Data of the telegrams before the open one [bytes]."""
     open_bytes: Number
-    """Data of the open one [bytes]."""
+    """Data of the open telegram [bytes]."""
 
     @property
     def data_bytes(self) -> Number:
-        """Data of all of them, padded [bytes]."""
+        """Data of all telegrams, padding included [bytes]."""
         return self.closed_bytes + padded_bytes(self.open_bytes)
 
 
 def padded_bytes(data_bytes: Number) -> Number:
-    """Data of a telegram, with what is padded [bytes].
+    """Data of a telegram, padding included [bytes].
 
     Examples
     --------
@@ -65,18 +65,10 @@ def padded_bytes(data_bytes: Number) -> Number:
 
 
 def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, name: str = "") -> Filling:
-    """Fill telegrams with items in their order: what does not fit into one goes whole into the next.
+    """Telegrams filled with items in their order; an item that does not fit goes whole into the next telegram.
 
-    Parameters
-    ----------
-    items
-        They, like ones together.
-    first_bytes
-        What the first telegram begins with [bytes].
-    next_bytes
-        What each other telegram begins with [bytes].
-    name
-        What a derivation calls the telegrams.
+    The first telegram begins with `first_bytes` of fields, each other one with `next_bytes`; `name` is their name in a
+    derivation.
 
     Examples
     --------
@@ -109,17 +101,7 @@ def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) ->
 def telegrams_us(filling: Filling, *, gap_bytes: Number) -> Number:
     """Time of telegrams on the wire, each with the gap after it [us].
 
-    Parameters
-    ----------
-    filling
-        The telegrams.
-    gap_bytes
-        Gap between two telegrams [bytes]; float or array.
-
-    Returns
-    -------
-    float
-        (data + telegrams (32 + gap)) 0.08 us.
+    (data + telegrams (32 + gap)) 0.08 us.
 
     Examples
     --------
@@ -131,7 +113,7 @@ def telegrams_us(filling: Filling, *, gap_bytes: Number) -> Number:
 
 @step("J")
 def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
-    """Jitter of the synchronisation: half of the master's and of the gap [us].
+    """Jitter of the synchronisation [us]: half of the master's and of the gap.
 
     Examples
     --------
@@ -145,7 +127,7 @@ def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
 def ring_delay_us(
     devices: Number, *, device_delay_us: Number, gap_bytes: Number, component_delay_us: Number = 0.0
 ) -> Number:
-    """Delay of the ring: there and back through every device, half a gap, and what is no device [us].
+    """Delay of the ring [us]: every device there and back, half a gap, and components that are no devices.
 
     Examples
     --------
@@ -158,12 +140,8 @@ def ring_delay_us(
 def start_wait_us(least_us: Number, *, earliest_us: Number) -> Number:
     """Wait before the AT, where the devices ask for a later start, the minimum of S-0-1006 [us].
 
-    Parameters
-    ----------
-    least_us
-        The least time that they ask for, from the start of the cycle [us].
-    earliest_us
-        When the AT could begin without it [us].
+    `least_us` is the earliest start that they accept, `earliest_us` the start without it, both from the start of the
+    cycle.
 
     Examples
     --------
@@ -206,7 +184,7 @@ TERMS: Final = (
     ),
     NONPERIODIC,
 )
-"""In the order of the wire, where other frames come last."""
+"""Terms in the order of the wire, with other frames last."""
 COUNTS: Final = (MDT_TELEGRAMS, AT_TELEGRAMS)
 FIGURES: Final = BusFigures(
     TERMS,
@@ -223,7 +201,7 @@ SORTS: Final[dict[TransactionKind, str]] = {"write": "mdt", "read": "at"}
 
 
 class Telegrams(NamedTuple):
-    """All MDT or all AT of a network. The numbers may be of any sort."""
+    """All MDT or all AT of a network; floats, arrays or traced numbers."""
 
     first_bytes: Number
     """Fields at the start of the first telegram [bytes]."""
@@ -236,20 +214,12 @@ class Telegrams(NamedTuple):
 
     @property
     def filling(self) -> Filling:
-        """The telegrams, filled."""
+        """The telegrams filled with their items."""
         return filled(self.items, first_bytes=self.first_bytes, next_bytes=self.next_bytes, name=self.name)
 
 
 def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
-    """The telegrams that carry one of a node's payloads.
-
-    Parameters
-    ----------
-    network
-        The network.
-    kind
-        "write" for MDT, "read" for AT.
-    """
+    """Telegrams that carry a payload of each node: MDT for "write", AT for "read"."""
     is_in_all = network.profile.bus.hot_plug_field == "all"
     sizes = (group.write_bytes if kind == "write" else group.read_bytes for group in network.groups)
     first_bytes: Number = c.HOT_PLUG_BYTES

@@ -1,4 +1,4 @@
-"""The cycle of SERCOS III: MDT, AT, the channel for other frames, and what the window of the master keeps free."""
+"""The cycle of SERCOS III: MDT, AT, the channel for other frames, and the times that the master's window keeps free."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -44,9 +44,9 @@ EVENTS: Final = (
     EventKind("master", "master", _COSEMA, "=", "work"),
     EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
 )
-"""Kinds of events, in the order of the cycle."""
+"""Kinds of events in the order of the cycle."""
 STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
-"""Stretches that several events make together."""
+"""Kinds of stretches, each a sequence of events."""
 
 
 PREMISES: Final = (
@@ -63,8 +63,8 @@ PREMISES: Final = (
 class Sercos3Cycle(SercosCycle):
     """MDT, AT, the channel for other frames, and under the model `window` jitter, the master, the ring and the devices.
 
-    The window is that of CoSeMa: by the timing method it asks that the channel for other frames ends before the next
-    cycle begins, or before the AT do. What the nodes execute runs beside the telegrams.
+    The window is that of CoSeMa: depending on the timing method, the channel for other frames must end before the next
+    cycle begins, or before the AT begin. Nodes execute beside the telegrams.
     """
 
     term_figures = TERMS
@@ -77,7 +77,7 @@ class Sercos3Cycle(SercosCycle):
 
     @cached_property
     def fillings(self) -> dict[TransactionKind, Filling]:
-        """MDT and AT, filled."""
+        """MDT and AT, filled with their data."""
         return {kind: telegrams_of(self.network, kind).filling for kind in SORTS}
 
     def _telegrams_us(self, kind: TransactionKind) -> Number:
@@ -91,7 +91,7 @@ class Sercos3Cycle(SercosCycle):
 
     @cached_property
     def ring_us(self) -> Number:
-        """Delay of the ring; none under the model `telegrams` [us]."""
+        """Delay of the ring [us]; 0 under the model `telegrams`."""
         bus = self.network.profile.bus
         if not self.is_window:
             return 0.0
@@ -105,7 +105,7 @@ class Sercos3Cycle(SercosCycle):
 
     @property
     def _jitters(self) -> tuple[int, int]:
-        """Number of jitters kept free: before the AT at the earliest, and in the whole cycle."""
+        """Number of jitters kept free: before the earliest AT, and in the whole cycle [1]."""
         return {"mdt-at-ucc": (1, 3), "mdt-ucc-at": (2, 3), "at-last": (1, 2)}[self.method]
 
     @property
@@ -131,12 +131,12 @@ class Sercos3Cycle(SercosCycle):
 
     @property
     def _earliest_us(self) -> Number:
-        """When the AT could begin, from the start of the cycle [us]."""
+        """Earliest start of the AT, from the start of the cycle [us]."""
         before_us = self.network.nonperiodic_us if self._has_ring else 0.0
         return self._telegrams_us("write") + before_us + self._jitters[0] * self.jitter_us
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """The telegrams, the wait of the devices, and what the window keeps free."""
+        """The telegrams, the wait for the devices, and the times that the window keeps free."""
         channel = BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "channel for other frames")
         is_last = self.method == "mdt-at-ucc"
         jitter_us = self._jitters[1] * self.jitter_us if self.is_window else 0.0
@@ -161,9 +161,9 @@ class Sercos3Cycle(SercosCycle):
         return Run((telegrams,), laid_out=lambda _: self._telegrams(kind))
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """Inputs that are published as a range alone: the delay of a device, the master's jitter, and the gap.
+        """Doubts of inputs that are published only as a range: a device's delay, the master's jitter, and the gap.
 
-        Each is the same in the whole cycle. A wait of the devices may hide some of it.
+        Each is the same in the whole cycle. A wait for the devices may hide some of it.
         """
         bus = self.network.profile.bus
         if not self.is_window or bus.ring_grade == "measured":
@@ -183,11 +183,11 @@ class Sercos3Cycle(SercosCycle):
         )
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Numbers of telegrams."""
+        """Numbers of MDT and AT telegrams [1]."""
         return {f"{sort}_telegrams": self.fillings[kind].telegrams for kind, sort in SORTS.items()}
 
     def _start_us(self) -> Number:
-        """From the start of a cycle in the master to the first byte: its delay ends with the first header [us]."""
+        """Time from the start of a cycle in the master to the first byte [us]: its delay ends with the first header."""
         if not self.is_window:
             return 0.0
         delay_us: Number = self.network.profile.bus.master_delay_us
@@ -195,7 +195,7 @@ class Sercos3Cycle(SercosCycle):
 
     @property
     def feedback_due_us(self) -> Number:
-        """The first AT begins then; by the last method it ends with the cycle [us]."""
+        """Time by which feedback must be ready [us]: the first AT begins then; "at-last" ends the AT with the cycle."""
         mdt_us, sent = self._telegrams_us("write"), self.by_term
         if not self.is_window:
             return mdt_us
@@ -217,7 +217,7 @@ class Sercos3Cycle(SercosCycle):
         )
 
     def _telegrams(self, kind: TransactionKind) -> Iterator[BusEvent]:
-        """All telegrams of one sort."""
+        """Events of all telegrams of one sort."""
         sort, gap = SORTS[kind], self.network.profile.bus.gap_bytes
         term = f"cycle_{sort}_us"
         for number, telegram in enumerate(_laid_out(telegrams_of(self.network, kind))):
@@ -233,7 +233,7 @@ class Sercos3Cycle(SercosCycle):
 
 
 def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
-    """The pieces of each telegram of plain numbers: bytes, and the device whose data they are; 0 for other fields."""
+    """Pieces of each telegram, in plain numbers: bytes, and the device whose data they are, 0 for other fields."""
     laid_out = [[(telegrams.first_bytes, 0)]]
     used, node = telegrams.first_bytes, 0
     for place, items in enumerate(telegrams.items):
@@ -249,4 +249,4 @@ def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
 
 
 _FIELDS: Final = 2
-"""Items before the data of devices: service channels, and control or status."""
+"""Number of items before the data of devices: service channels, and control or status."""

@@ -1,4 +1,4 @@
-"""SERCOS III, as a kind of bus."""
+"""SERCOS III as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
@@ -67,7 +67,7 @@ class Sercos3(SercosBus):
 
     kind = "sercos3"
     title = "SERCOS III"
-    also_called = ("SERCOS",)  # the newest is meant where none is said
+    also_called = ("SERCOS",)  # A user who names no version means the newest.
     timing_models = (
         TimingModel(WINDOW, "telegrams, jitter, master and devices, and the ring delay where the method has it"),
         TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
@@ -100,17 +100,17 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     evidence_data = ("sercos3",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
-        """The cycle of a network under a timing model."""
+        """Cycle of a network under a timing model."""
         return Sercos3Cycle(network, model)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """The other timing methods, in the order of CoSeMa."""
+        """Setting of the other timing methods, in the order of CoSeMa."""
         current = network.profile.bus.timing_method
         values = tuple({_METHOD: method} for method in _METHODS if method != current)
         return (Setting("timing_method", "timing method", Cost.SCHEDULE, (_METHOD,), values),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A wider gap, and slower devices."""
+        """Perturbations: a wider gap, and slower devices."""
         bus = network.profile.bus
         beside = "" if bus.timing_method != "mdt-at-ucc" else "this timing method has no ring delay"
         return (
@@ -121,19 +121,19 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Payloads of whole words: four telegrams carry those of all devices, one telegram that of a device."""
+        """Payloads in whole words: four telegrams hold those of all devices, one telegram that of a device."""
         share = int(c.MOST_TELEGRAMS * c.MOST_BYTES) // int(network.nodes)
         return PayloadRange(
             int(c.WORD_BYTES), min(share, int(c.MOST_BYTES - c.CONNECTION_BYTES)), carrier="four telegrams"
         )
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """Version, timing method and gap."""
+        """Words for version, timing method and gap."""
         bus = network.profile.bus
         return (bus.version, f"timing method {bus.timing_method}", f"gap {bus.gap_bytes} bytes")
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - whatever their number
-        """A channel for other frames that the master does not open."""
+        """Warning of a channel for other frames that the master does not open."""
         given_us = network.nonperiodic_us
         if not 0 < given_us < c.LEAST_UCC_US:
             return []

@@ -1,4 +1,4 @@
-"""The keys that only profiles of SERCOS III have, in [bus]."""
+"""Keys of [bus] that only SERCOS III has."""
 
 from typing import Annotated, Final, Literal
 

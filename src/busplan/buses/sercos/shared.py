@@ -16,14 +16,14 @@ from busplan.elementwise import Number, larger, rounded_up, total
 from busplan.sourced import Constants
 
 c: Final = Constants("busplan.buses.sercos", "shared.toml")
-"""Constants of all SERCOS with a source, by their names here."""
+"""Constants of all SERCOS with a source, by their names."""
 
 RULES: Final = {
     rule.code: rule for rule in read_rules("busplan.buses.sercos", {"BP141": unknown_period, "BP151": unknown_period})
 }
 """Rules of both kinds, by code."""
 MOST_PIPELINE: Final = 1000
-"""Most cycles of a pipeline that a profile takes."""
+"""Largest number of cycles that a profile may give a pipeline."""
 
 
 def word_bytes(payload_bytes: Number) -> Number:
@@ -51,9 +51,9 @@ DELAYS: Final = (
     Figure("ring_us", "t_ring", _CYCLE, "delay of the ring", "ring"),
     Figure("delay_us", "t", _CYCLE, "from sample to host, or from the start of the cycle to the effect", "delay"),
 )
-"""In the order in which they add up."""
+"""Parts of a delay in the order in which they add up, then the delay."""
 Sent: TypeAlias = tuple[Number, Number]
-"""What the cycle sends before feedback or a command, and the telegrams that carry it [us]."""
+"""Time that the cycle takes before feedback or a command, and time of the telegrams that carry it [us]."""
 KEYS: Final[Mapping[str, Key]] = {
     "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
     "node.execution.worst_extra_us": Key("T_extra"),
@@ -61,7 +61,7 @@ KEYS: Final[Mapping[str, Key]] = {
 
 
 def starter(bus: str) -> Starter:
-    """A new profile with a section [bus]."""
+    """Defaults of a new profile with the given section [bus]."""
     return Starter(
         bus,
         slice_ratio="1            # assumed: the master computes beside the telegrams, within bus.pipeline_cycles",
@@ -74,15 +74,6 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
     """Age of feedback when the host has it, and delay of a command up to its effect.
 
     All nodes sample at once, and take their commands over at once.
-
-    Parameters
-    ----------
-    network
-        The network.
-    feedback_us, command_us
-        What is sent before and with them [us].
-    ring_us
-        Delay of the ring [us].
     """
     write_us = (group.write_execution_us + group.worst_extra_us for group in network.groups)
     return (
@@ -102,24 +93,24 @@ def _delay(name: str, *parts_us: Number) -> BusLatency:
 
 
 class SercosCycle(BusCycle):
-    """A cycle of SERCOS."""
+    """A cycle of SERCOS I, II or III."""
 
     @property
     @abstractmethod
     def feedback_due_us(self) -> Number:
-        """When all nodes must have their feedback ready, from the start of the cycle [us]."""
+        """Time from the start of the cycle by which all nodes must have their feedback ready [us]."""
 
     def arrival_us(self, node: int) -> float:  # noqa: ARG002 - all at once
-        """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
+        """Time at which the last byte of the MDT has passed the ring, so that all nodes have their commands [us]."""
         _, command = self.latencies()
         return command.phases["delay_us"] - command.phases["node_us"]
 
     def sampled_us(self) -> float:
-        """All nodes sample at once, early enough for the slowest of them [us]."""
+        """Time at which all nodes sample at once, early enough for the slowest [us]."""
         return self.feedback_due_us - _slowest_read_us(self.network)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
+        """Periods inside a loop [1]: the pipeline; `at_sync` also the cycles until drives act, at their next sample."""
         pipeline = int(self.network.profile.bus.pipeline_cycles)
         if not at_sync:
             return pipeline
@@ -129,12 +120,12 @@ class SercosCycle(BusCycle):
 
 
 class SercosBus(Bus):
-    """A ring of SERCOS: its drives work beside the telegrams."""
+    """A ring of SERCOS, whose drives work beside the telegrams."""
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose delay it is, and how the bus is set."""
+        """Words for the way that the delays cover, and for the settings of the bus."""
         return ", ".join(("feedback and commands of all nodes", *self.setup_words(network)))
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
-        """Execution runs beside the telegrams, and is in every latency: drives sample before their telegram."""
+        """Whether execution counts: in latencies only, since drives sample before their telegram."""
         return of_latency
