@@ -1,0 +1,160 @@
+"""An answer is complete when it is returned: no form of it asks a bus, the fit, the search or the servo again.
+
+A form may ask the register of figures what a figure is called and which unit it has.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from inspect import Parameter, signature
+from pathlib import Path
+from pkgutil import walk_packages
+from types import FrameType
+from typing import Any
+
+import pytest
+
+import busplan
+from busplan.buses.bus import Bus
+from busplan.buses.network import Network
+from busplan.errors import BusplanError
+from busplan.forms import ENDINGS
+from busplan.gate.formats import FORMATS
+
+COMPUTE = ("busplan.buses", "busplan.questions.fit", "busplan.servo")
+REGISTER = "busplan.buses.figure"
+FILES = Path(__file__).parents[1] / "questions" / "import_" / "files"
+TABLE = Path(__file__).parents[2] / "profiles" / "table-1.csv"
+KINDS = (
+    *("gantry-24", "paper-1ms", "can-servo-8", "canopen-6", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8"),
+    "profibus-drives-6",
+)
+TIGHT = {"cycle.period_us": 300, "limits.reserve": 0.1, "limits.min_spare_nodes": 9}
+X, Y = {"limits.reserve": [0, 0.3]}, {"cycle.period_us": [500, 1000]}
+
+
+def machines(*names: str) -> Iterator[tuple[str, busplan.Profile]]:
+    """Some shipped profiles, and three of them with a period that is too short."""
+    for name in names:
+        yield name, busplan.load_profile(name)
+        if name in KINDS[:3]:
+            yield f"{name}, tight", busplan.load_profile(name, changes=TIGHT)
+
+
+def recorded(profile: busplan.Profile, folder: Path) -> busplan.MeasuredAnswer:
+    """What a recording of an emulated machine shows."""
+    path = folder / f"recording.{'log' if profile.bus.kind == 'can' else 'pcapng'}"
+    busplan.emulate(profile, cycles=20).save(path)
+    return busplan.measured(profile, path)
+
+
+Ask = Callable[[busplan.Profile, Path], Any]
+QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
+    "calibrate": (lambda profile, _: busplan.calibrate(profile, TABLE), ("paper-1ms",)),
+    "capacity": (lambda profile, _: busplan.capacity(profile, period_us=[500, 1000], sensitivity=True), KINDS),
+    "check": (lambda profile, _: busplan.check(profile, circle=False), KINDS),
+    "circle_test": (lambda profile, _: busplan.circle_test(profile, contributions=True), ("paper-1ms",)),
+    "compare": (lambda profile, _: busplan.compare(profile), ("gantry-24",)),
+    "diff": (lambda profile, _: busplan.diff(profile, "gantry-24"), KINDS),
+    "emulate": (lambda profile, _: busplan.emulate(profile, cycles=20), ("can-servo-8",)),
+    "evidence": (lambda profile, _: busplan.evidence(profile.bus.kind), ("can-servo-8",)),
+    "explain": (lambda profile, _: busplan.explain(profile), KINDS),
+    "explore": (lambda profile, _: busplan.explore(profile, x=X, y=Y, over={"cycle.retries": [0, 1]}), ("paper-1ms",)),
+    "import_profile": (lambda _, __: busplan.import_profile([FILES / "machine.dbc"]), ("can-servo-8",)),
+    "latency": (lambda profile, _: busplan.latency(profile), KINDS),
+    "map_": (lambda profile, _: busplan.map_(profile, x=X, y=Y), KINDS),
+    "measured": (recorded, ("can-servo-8", "ethercat-servo-8")),
+    "plan": (lambda profile, _: busplan.plan(profile, free=["period"]), KINDS),
+    "report": (lambda profile, _: busplan.report(profile, circle=False), ("gantry-24", "can-servo-8")),
+    "sweep": (lambda profile, _: busplan.sweep(profile, vary=Y), KINDS),
+    "timeline": (lambda profile, _: busplan.timeline(profile), KINDS),
+}
+"""Each question, and the machines that it is asked of."""
+ASKED = [
+    pytest.param(ask, profile, id=f"{question} {name}")
+    for question, (ask, names) in QUESTIONS.items()
+    for name, profile in machines(*names)
+]
+
+
+def test_no_question_is_missing() -> None:
+    assert {name for name in busplan.__all__ if name.islower()} - {"__version__", "load_profile"} == QUESTIONS.keys()
+
+
+def forms(answer: Any, folder: Path) -> Iterator[Callable[[], Any]]:
+    """All that an answer gives without being told more, and the files that it writes."""
+    for name in dir(type(answer)):
+        if not name.startswith("_"):
+            yield lambda name=name: given(getattr(answer, name))
+    for show in (str, repr, shown_in_a_notebook):
+        yield lambda show=show: show(answer)
+    for ending in (*ENDINGS, ".svg", ".parquet", ".pcapng", ".log"):
+        yield lambda ending=ending: answer.save(folder / f"answer{ending}")
+    if isinstance(answer, busplan.CheckAnswer):
+        yield from (lambda form=form: form.write(answer) for form in FORMATS.values())
+
+
+def given(value: Any) -> Any:
+    """What a method gives that can do without arguments; any other value as it is."""
+    if not callable(value):
+        return value
+    needed = (one for one in signature(value).parameters.values() if one.default is Parameter.empty)
+    return None if any(one.kind is not Parameter.VAR_KEYWORD for one in needed) else value()
+
+
+def shown_in_a_notebook(answer: Any) -> None:
+    """What a notebook shows."""
+    answer._repr_html_()
+    answer._repr_svg_()
+
+
+def calls(draw: Callable[[], Any]) -> set[str]:
+    """The functions that compute, of those that are called."""
+    called = set()
+
+    def seen(frame: FrameType, event: str, _: Any) -> None:
+        room = frame.f_globals.get("__name__", "")
+        if event == "call" and room.startswith(COMPUTE) and room != REGISTER:
+            called.add(f"{room}.{frame.f_code.co_qualname}")
+
+    sys.setprofile(seen)
+    try:
+        with suppress(BusplanError):  # a form that it does not have
+            draw()
+    finally:
+        sys.setprofile(None)
+    return called
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _all_modules() -> None:
+    """A module that is loaded late calls its own functions."""
+    for module in walk_packages(busplan.__path__, "busplan."):
+        if not module.name.endswith("__main__"):
+            import_module(module.name)
+
+
+def held(value: Any) -> Iterator[type]:
+    """The types of a record and of all that it holds."""
+    yield type(value)
+    parts: Any = ()
+    if is_dataclass(value):
+        parts = [getattr(value, field.name) for field in fields(value)]
+    elif isinstance(value, tuple | list):
+        parts = value
+    elif isinstance(value, dict):
+        parts = value.values()
+    for part in parts:
+        yield from held(part)
+
+
+@pytest.mark.parametrize(("ask", "profile"), ASKED)
+def test_forms_compute_nothing(ask: Ask, profile: busplan.Profile, tmp_path: Path) -> None:
+    try:
+        answer = ask(profile, tmp_path)
+    except BusplanError as refused:
+        pytest.skip(str(refused))
+    assert set().union(*map(calls, forms(answer, tmp_path))) == set()
+    assert not {kind for kind in held(answer) if issubclass(kind, (Network, Bus))}
