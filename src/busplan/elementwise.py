@@ -18,7 +18,7 @@ from busplan.sourced import Input, Sourced, input_of, short
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Number: TypeAlias = "float | NDArray[Any] | Traced"
+    Number: TypeAlias = float | Any  # a float to those who read it; arrays and traced numbers stand in for one
 else:
     Number: TypeAlias = object  # only type checkers ask what it is, and numpy stays unloaded
 """A plain number, an array, or a `Traced` number. Booleans count as numbers."""
@@ -147,10 +147,7 @@ class Traced:
         return bool(self.value)
 
     def __float__(self) -> float:
-        return plain(self)  # which refuses it: a plain number has lost its expression
-
-    def __int__(self) -> int:
-        return int(plain(self))
+        raise TypeError("a traced number as a plain one has lost its expression")
 
 
 def value_of(operand: Number) -> float:
@@ -184,24 +181,6 @@ def _applied(name: str, *numbers: Number) -> Number:
     return result
 
 
-def plain(number: Number) -> float:
-    """The very number, where it must be plain.
-
-    Raises
-    ------
-    TypeError
-        It is of another sort.
-
-    Examples
-    --------
-    >>> plain(3), plain(True)
-    (3, True)
-    """
-    if isinstance(number, _PLAIN):
-        return number
-    raise TypeError(f"expected a plain number, got {type(number).__name__}")
-
-
 def existing(number: Number) -> float | None:
     """A plain number; None for infinity, which stands for what does not exist.
 
@@ -210,8 +189,7 @@ def existing(number: Number) -> float | None:
     >>> existing(2.5), existing(inf)
     (2.5, None)
     """
-    value = plain(number)
-    return None if isinf(value) else value
+    return None if isinf(number) else number
 
 
 def within(number: Number, most: Number) -> Number:

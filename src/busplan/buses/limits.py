@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject, told_apart
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain, smaller
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, smaller
 from busplan.sourced import Grade
 
 Value = int | float | str
@@ -411,7 +411,7 @@ def period_limit(periods: Periods) -> Limit:
     """
     return Limit(
         PERIOD_LIMIT,
-        lambda network: periods.refusal(plain(network.period_us)),
+        lambda network: periods.refusal(network.period_us),
         lambda network: choose(periods.shortest_us(network.period_us) > network.period_us, 1, 0),
         lambda _network: 0,
         way_out="a period that the bus allows will do",
@@ -458,9 +458,9 @@ def slow_groups(network: Network) -> Iterator[Group]:
 
 def busy_words(group: Group, network: Network) -> str:
     """Say how long a node of a group executes, and its period; of plain numbers."""
-    doubt_us = COVERAGE * plain(_busy_doubt_us(group))
+    doubt_us = COVERAGE * _busy_doubt_us(group)
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
-    busy, most = told_apart(plain(_busy_us(group)), plain(network.period_us * group.every))
+    busy, most = told_apart(_busy_us(group), (network.period_us * group.every))
     return f"a node executes for {busy}{either_way} us of {most} us"
 
 

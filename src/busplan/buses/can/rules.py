@@ -23,7 +23,7 @@ from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, choose, larger, plain, pointwise, smaller, total, within
+from busplan.elementwise import Number, choose, larger, pointwise, smaller, total, within
 from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US
 
@@ -111,7 +111,7 @@ def _kept_from_us(network: Network, *, is_shown: bool) -> float:
 
     if not traffic_of(network).has_cycle:
         return inf
-    broken_us = kept_us = plain(network.period_us)
+    broken_us = kept_us = network.period_us
     while not is_kept(kept_us):
         broken_us, kept_us = kept_us, 2 * kept_us
         if kept_us > MAX_TIME_US:
@@ -205,7 +205,7 @@ def _payload_words(network: Network) -> str:
     frames = (
         f"{over.name}_pdos" if len(over.frame_bytes) > 1 or over.most_bytes == over.frame_bytes[0] else "four frames"
     )
-    return f"a PDO of {plain(over.payload_bytes):.0f} bytes is over the {over.most_bytes} bytes of {frames}"
+    return f"a PDO of {over.payload_bytes:.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 
 def _longest(network: Network) -> CanCycle:
@@ -227,7 +227,7 @@ _LOAD: Final = "the bus load with the longest bits"
 
 
 def _load_words(network: Network) -> str:
-    load, most = plain(_longest(network).load), network.profile.most_load
+    load, most = _longest(network).load, network.profile.most_load
     over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
     return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
 
@@ -328,7 +328,7 @@ LIMITS: Final = (
 def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
     if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
-        load, most = plain(_longest(subject.network).load), subject.network.profile.most_load
+        load, most = _longest(subject.network).load, subject.network.profile.most_load
         yield RuleProblem(
             "limits.max_load", f"{_LOAD} is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )

@@ -38,7 +38,7 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network, Rate
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, larger, named, plain, rounded_up, square_root, total
+from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
@@ -186,24 +186,24 @@ class EthercatCycle(BusCycle):
 
     def _frames(self) -> Iterator[BusEvent]:
         """Each frame: its overhead, then the data of each device in it."""
-        sizes = [plain(group.data_bytes) for group in self._devices for _ in range(int(plain(group.number)))]
+        sizes = [group.data_bytes for group in self._devices for _ in range(int(group.number))]
         number = 0
         for run in frames(self.network, self._devices):
             for carried in run.by_frame():
                 number += 1
-                overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in carried)
-                us, label = plain(sending_us(overhead)), f"headers of frame {number}"
+                overhead = frame_bytes(run.datagrams_bytes) - sum(sizes[device - 1] for device in carried)
+                us, label = sending_us(overhead), f"headers of frame {number}"
                 yield BusEvent("overhead", "cycle_frames_us", us, label, None, "frame")
                 for device in carried:
-                    us = plain(sending_us(sizes[device - 1]))
+                    us = sending_us(sizes[device - 1])
                     yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
         """The path of the last byte to each device and through it, and back."""
         way, device = [], 0
         for group in self.network.groups:
-            to_us, through_us = plain(cable_us(group.node.cable_length_m)) / 2, plain(hop_us(group)) / 2
-            for _ in range(int(plain(group.nodes))):
+            to_us, through_us = cable_us(group.node.cable_length_m) / 2, hop_us(group) / 2
+            for _ in range(int(group.nodes)):
                 device += 1
                 way += [
                     BusEvent("cable", "cycle_cable_us", to_us, f"cable to device {device}", device, "way"),
@@ -230,7 +230,7 @@ class EthercatCycle(BusCycle):
         cycles = cycles_of(self.network)
         names = (group.name for group, is_due in zip(self.network.groups, cycles[0].due, strict=True) if is_due)
         shown, number = ", ".join(names) or "no group", sum(len(cycle.numbers) for cycle in cycles)
-        mean_us, given_us = plain(self._mean_us), plain(self._given_us)
+        mean_us, given_us = self._mean_us, self._given_us
         return (
             ("fullest cycle", f"has {shown}; {len(cycles[0].numbers)} of {number} cycles are so"),
             ("mean cycle", f"{mean_us:.1f} us, {mean_us / given_us:.0%}".replace("%", " %")),
@@ -265,37 +265,37 @@ class EthercatCycle(BusCycle):
             Number of the device, from 1.
         """
         network = self.network
-        sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
+        sent_us = network.profile.bus.master_us + network.profile.bus.master_jitter_us
         for run in frames(network, devices(network)):
-            frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), node - run.first
+            frame_us, before = sending_us(frame_bytes(run.datagrams_bytes)), node - run.first
             if before < run.devices * run.frames:
                 sent_us += (before // run.devices + 1) * frame_us
                 break
             sent_us += run.frames * frame_us
         way_us, left = 0.0, node
         for group in network.groups:
-            passed = min(left, int(plain(group.nodes)))
-            way_us += passed * plain(hop_us(group) + cable_us(group.node.cable_length_m)) / 2
+            passed = min(left, int(group.nodes))
+            way_us += passed * (hop_us(group) + cable_us(group.node.cable_length_m)) / 2
             left -= passed
-        return sent_us + way_us
+        return float(sent_us + way_us)
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The master's pipeline, and the periods that feedback waits for a frame and a command for SYNC0 [1].
 
         The slowest group counts; groups at slower rates are left out.
         """
-        network, period_us = self.network, plain(self.network.period_us)
-        shift_us = plain(sync0_us(network)) if at_sync else 0.0
-        last_us = self.arrival_us(int(plain(network.nodes)))
+        network, period_us = self.network, self.network.period_us
+        shift_us = sync0_us(network) if at_sync else 0.0
+        last_us = self.arrival_us(int(network.nodes))
 
         def waits(group: Group) -> float:
-            extra_us = plain(group.worst_extra_us)
-            sampled = plain(_until_taken((shift_us + plain(group.read_execution_us) + extra_us) / period_us))
-            late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
-            return sampled + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
+            extra_us = group.worst_extra_us
+            sampled = _until_taken((shift_us + group.read_execution_us + extra_us) / period_us)
+            late_us = last_us + group.write_execution_us + extra_us - shift_us
+            return sampled + (max(rounded_up(late_us / period_us), 0) if at_sync else 0)
 
         groups = [group for group in network.groups if not group.is_slower] or network.groups
-        return int(max(map(waits, groups)) + plain(network.profile.bus.pipeline_cycles))
+        return int(max(map(waits, groups)) + network.profile.bus.pipeline_cycles)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst case of a command, of feedback, and of a loop over both, for each group."""

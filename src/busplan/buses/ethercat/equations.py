@@ -6,7 +6,7 @@ from typing import Final, Literal
 
 from busplan.buses.figure import BusFigures, read_figures
 from busplan.buses.published import Spread, published, rows_of
-from busplan.elementwise import Number, choose, larger, plain, traced_with
+from busplan.elementwise import Number, choose, larger, traced_with
 from busplan.sourced import Constants
 
 Port = Literal["100BASE-TX", "E-bus"]
@@ -116,7 +116,7 @@ def room_bytes(datagrams: int) -> float:
     >>> room_bytes(1), room_bytes(2)
     (1486.0, 1474.0)
     """
-    return plain(c.MOST_FRAME_BYTES - plain(overhead_bytes(1)) - datagrams * c.DATAGRAM_BYTES)
+    return c.MOST_FRAME_BYTES - overhead_bytes(1) - datagrams * c.DATAGRAM_BYTES
 
 
 def sending_us(wire_bytes: Number) -> Number:

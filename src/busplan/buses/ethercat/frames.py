@@ -32,7 +32,6 @@ from busplan.elementwise import (
     is_off,
     larger,
     named,
-    plain,
     pointwise,
     rounded_down,
     rounded_up,
@@ -186,7 +185,7 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     room, headers = room_bytes(datagrams), datagrams * float(c.DATAGRAM_BYTES)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
-        size, left = plain(group.data_bytes), int(plain(group.number))
+        size, left = group.data_bytes, int(group.number)
         if group.starts and filled and size and left:
             if group.starts == "datagram" and opened + filled + headers + size <= room:
                 filled += headers
@@ -306,8 +305,8 @@ def unit_cycles(
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
         present = [unit.present(is_due=is_due) for unit, is_due in zip(units, due, strict=True)]
         packed = pack(present, datagrams=datagrams, first_bytes=first_bytes)
-        data_bytes = plain(sum(group.number * group.data_bytes for group in present))
-        cycles.append(UnitCycle(due, numbers, plain(packed.wire_bytes), plain(packed.last_bytes), data_bytes))
+        data_bytes = sum(group.number * group.data_bytes for group in present)
+        cycles.append(UnitCycle(due, numbers, packed.wire_bytes, packed.last_bytes, data_bytes))
     return tuple(sorted(cycles, key=lambda cycle: (-cycle.wire_bytes, -cycle.data_bytes)))
 
 
@@ -336,13 +335,13 @@ def has_rates(network: Network) -> bool:
 
 def rates(network: Network) -> tuple[Rate, ...]:
     """The rate of each group with its first cycle; of plain numbers."""
-    units, _ = _units(network, map(plain, _cycle_inputs(network, _all_devices(network))))
+    units, _ = _units(network, _cycle_inputs(network, _all_devices(network)))
     return unit_rates(units, is_spread=network.profile.bus.units == "spread")
 
 
 def cycles_of(network: Network) -> tuple[UnitCycle, ...]:
     """The distinct cycles of the hyperperiod, the fullest first; of plain numbers."""
-    return _cycles(network, map(plain, _cycle_inputs(network, _all_devices(network))))
+    return _cycles(network, _cycle_inputs(network, _all_devices(network)))
 
 
 def devices(network: Network) -> tuple[Devices, ...]:
@@ -377,7 +376,7 @@ def mean_wire_bytes(network: Network, *, with_reception: Number) -> Number:
         sum_bytes = cycles = 0.0
         for cycle in _cycles(network, numbers):
             # A cycle without process data may have no frame.
-            last_bytes = plain(frame_bytes(cycle.last_bytes)) if with_reception and cycle.last_bytes else 0.0
+            last_bytes = frame_bytes(cycle.last_bytes) if with_reception and cycle.last_bytes else 0.0
             sum_bytes += len(cycle.numbers) * (cycle.wire_bytes + last_bytes)
             cycles += len(cycle.numbers)
         return sum_bytes / cycles
@@ -416,7 +415,7 @@ def moves_us(network: Network, group: int) -> Number:
         for device in starts.union(devices[:1]):
             sent = [ends[min(bisect_left(ends, (device,)), len(ends) - 1)][1] for ends in cycles]
             moved_bytes = max(moved_bytes, max(sent) - min(sent))
-        return plain(sending_us(moved_bytes))
+        return sending_us(moved_bytes)
 
     words = "the latest end of the device's frame less the earliest, over the cycles with its data"
     return pointwise(at_point, *_cycle_inputs(network, _all_devices(network)), words=words)
@@ -430,7 +429,7 @@ def _frame_ends(
     ends, sent_bytes = [], 0.0
     for run in frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes):
         for carried in run.by_frame():
-            sent_bytes += plain(frame_bytes(run.datagrams_bytes))
+            sent_bytes += frame_bytes(run.datagrams_bytes)
             ends.append((carried.stop - 1, sent_bytes))
     return ends
 
@@ -499,7 +498,7 @@ def packing(network: Network, present: Sequence[Devices]) -> Packing:
 
 def frames(network: Network, present: Sequence[Devices]) -> tuple[FrameRun, ...]:
     """The same frames in their order; of plain numbers."""
-    first_bytes = plain(housekeeping_bytes(network))
+    first_bytes = housekeeping_bytes(network)
     return tuple(frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes))
 
 

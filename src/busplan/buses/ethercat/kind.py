@@ -38,7 +38,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, choose, larger, plain
+from busplan.elementwise import Number, choose, larger
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -64,7 +64,7 @@ def _late_command_doubt_us(network: Network) -> Number:
 def _late_command_words(network: Network) -> str:
     """Say when the last command comes, and if it is late only where all of bus.master_us is spent before the frame."""
     value_us, doubt_us, most_us = (
-        plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
+        us for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
     )
     depends = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
     where = ", all of bus.master_us before the wire" if depends else ""
@@ -105,8 +105,8 @@ def _unknown_jitter_us(network: Network) -> Number:
 
 def _window_words(network: Network) -> str:
     """Say how far frames move at the group that is farthest beyond its window, and the jitter that it allows."""
-    jitter_us = plain(network.profile.bus.master_jitter_us)
-    moves = ((group, plain(us), plain(group.node.sync_window_us)) for group, us in _moves_us(network))
+    jitter_us = network.profile.bus.master_jitter_us
+    moves = ((group, us, group.node.sync_window_us) for group, us in _moves_us(network))
     group, us, most_us = max(moves, key=lambda move: move[1] - move[2])
     of_group = f"{group.name}: " if group.name else ""
     without = "" if jitter_us else " without the jitter, which is not given"
@@ -301,7 +301,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The layout of process data, the frames, and the clocks."""
-        count = int(plain(self.cycle(network, model=LAST_BYTE).packing.frames))
+        count = int(self.cycle(network, model=LAST_BYTE).packing.frames)
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
         return (layout(network), f"{plural(count, 'frame')}", *clocks)
 

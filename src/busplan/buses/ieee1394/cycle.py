@@ -29,7 +29,7 @@ from busplan.buses.ieee1394.transactions import (
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, smaller, total
+from busplan.elementwise import Number, is_off, larger, named, rounded_down, smaller, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 _PHASES: Final = by_key(LATENCY)
@@ -189,8 +189,8 @@ class CycleWithStarts(BusCycle):
         if not at_sync:
             return 0
         behind_us = max(self.taking_us(group) for group in self.network.groups)
-        period_us = plain(self.network.period_us)
-        needed_us = min(plain(self.required_us), period_us)
+        period_us = self.network.period_us
+        needed_us = min(self.required_us, period_us)
         return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
     def figures(self) -> Mapping[str, Number | None]:
@@ -224,7 +224,7 @@ class CycleWithStarts(BusCycle):
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
-        starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
+        starts, start_us = int(self.number_of_starts), self.cycle_start_us
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
         for round_ in map(tuple, super().each_round()):
@@ -233,13 +233,13 @@ class CycleWithStarts(BusCycle):
                 sent, now_us = sent + 1, now_us + start_us
             yield round_
             for event in round_:
-                now_us += plain(event.us)
+                now_us += event.us
         yield from repeat(start, starts - sent)
 
     def added_before_us(self, sent_us: float) -> float:
         """The cycle starts that are due before a round [us]."""
         due = smaller(self.starts(sent_us), self.number_of_starts)
-        return plain(due) * plain(self.cycle_start_us)
+        return due * self.cycle_start_us
 
 
 class Ieee1394Cycle(CycleWithStarts):

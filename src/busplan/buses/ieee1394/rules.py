@@ -20,7 +20,7 @@ from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of,
 from busplan.buses.limits import Limit, nodes_limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules, told_apart
-from busplan.elementwise import Number, plain
+from busplan.elementwise import Number
 from busplan.english import plural
 from busplan.sections.base import TRANSACTION_KINDS
 
@@ -48,10 +48,10 @@ def _cycle_start_us(network: Network) -> Number:
 
 def unsafe_words(network: Network) -> str:
     """Say which gap count is unsafe for which hops, and which is the smallest safe one; of plain numbers."""
-    hops, nodes = hops_of(network), plural(int(plain(network.nodes)), "node")
+    hops, nodes = hops_of(network), plural(int(network.nodes), "node")
     cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {c.REFERENCE_CABLE_M:g} m"
     return (
-        f"gap count {gap_count_of(network)} is unsafe for {plural(int(plain(hops)), 'hop')} ({nodes}); "
+        f"gap count {gap_count_of(network)} is unsafe for {plural(int(hops), 'hop')} ({nodes}); "
         f"the smallest safe one is {safe_gap_count_of(network)}{cables}"
     )
 

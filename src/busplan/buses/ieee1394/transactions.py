@@ -7,7 +7,7 @@ from busplan.buses.cycle import BusEvent
 from busplan.buses.ieee1394.constants import BETA_SPEEDS, c, safe_gap_count
 from busplan.buses.ieee1394.timing import Answer, Delays, Link, Phases, Responder, TimingModelName, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, named, plain, traced_with, worded
+from busplan.elementwise import Number, named, traced_with, worded
 from busplan.sections.base import TransactionKind
 
 
@@ -207,8 +207,8 @@ _ROUNDING_US: Final = 1e-9
 def _idle_periods(exchanged: Exchange, model: TimingModelName) -> tuple[list[BusEvent], list[BusEvent]]:
     """Idle bus before the response of a transaction, and after it: gaps, and the allowance for a faster node."""
     phases = exchanged.phases
-    sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
-    idle_us = plain(phases.idle_us)
+    sub_us, reset_us = phases.subaction_gap_us, phases.arbitration_reset_gap_us
+    idle_us = phases.idle_us
 
     def gap(kind: str, us: float, label: str) -> BusEvent:
         return BusEvent(kind, "cycle_idle_us", us, label, transaction=exchanged.kind)
@@ -220,7 +220,7 @@ def _idle_periods(exchanged: Exchange, model: TimingModelName) -> tuple[list[Bus
         ]
     if exchanged.responder.answer != "split":
         return [], [gap("arbitration_reset_gap", idle_us, "arbitration reset gap after the transaction")]
-    execution_us = plain(phases.execution_us) + plain(phases.worst_extra_us)
+    execution_us = phases.execution_us + phases.worst_extra_us
     before_us = max(sub_us - execution_us, 0.0)
     behind_us = idle_us - before_us
     # A response that comes after the arbitration reset gap leaves a subaction gap to wait for.

@@ -20,7 +20,7 @@ from busplan.buses.limits import (
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
 from busplan.buses.polled.protocols import c, protocol_of
-from busplan.elementwise import Number, larger, plain
+from busplan.elementwise import Number, larger
 
 
 def _largest_bytes(network: Network) -> Number:
@@ -154,7 +154,7 @@ class Polled(Bus):
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
         asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]
         adapter = (f"adapter {bus.adapter_us:g} us a request",) if bus.adapter_us else ()
-        return (name, f"{plain(bus.bit_rate_kbit_s):g} kbit/s", asked, *adapter)
+        return (name, f"{bus.bit_rate_kbit_s:g} kbit/s", asked, *adapter)
 
 
 BUS: Final = Polled()

@@ -9,7 +9,7 @@ from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, plain, square_root, total, within
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"
@@ -111,7 +111,7 @@ def is_shown_to_fit(network: Network) -> bool:
     """Whether the verdict on a network of plain numbers is that it fits, by the timing model that decides."""
     cycle = network.bus.cycle(network, model=network.bus.deciding_model)
     codes = {**limit_codes(network), TIME: time_code(certainty(cycle), network)}
-    return VERDICTS[int(plain(verdict_code(codes)))] == FITS
+    return VERDICTS[int(verdict_code(codes))] == FITS
 
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
-from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
 from busplan.questions.fit.needs import (
     Need,
@@ -229,7 +229,7 @@ def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
     """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
     if not needs or network is None:
         return 0, 0.0
-    periods_us = [need.period_us(float(plain(network.slice_ratio))) for need in needs]
+    periods_us = [need.period_us(float(network.slice_ratio)) for need in needs]
     return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
 
 
@@ -248,14 +248,14 @@ def _values(freedom: Freedom, network: Network, kept: Collection[str]) -> Iterat
         case "nodes":
             return _fewer_nodes(network)
     # A setting of the bus is safe for all nodes that [limits] asks for.
-    largest = max((network, *(room.network for room in rooms(network))), key=lambda room: float(plain(room.nodes)))
+    largest = max((network, *(room.network for room in rooms(network))), key=lambda room: float(room.nodes))
     settings = (setting for setting in network.bus.settings(largest) if setting.name == freedom.name)
     return (values for setting in settings for values in setting.values)
 
 
 def _ratios(network: Network) -> Iterator[Changes]:
     """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
-    own, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
+    own, period_us = float(network.slice_ratio), float(network.period_us)
     slice_us = max((need.slice_us for need in unmet(network) if need.slice_us < inf), default=0.0)
     ratio = min(ceil(_RATIO_STEPS * slice_us / period_us * (1 - FIT_ROUNDING)) / _RATIO_STEPS, MOST_RATIO)
     if ratio > own:
@@ -307,7 +307,7 @@ def _periods(network: Network) -> Iterator[Changes]:
     least = smallest_period(network)
     if least.us is None:
         return
-    periods, own_us = network.bus.periods, float(plain(network.period_us))
+    periods, own_us = network.bus.periods, float(network.period_us)
     if periods.us:
         allowed = (us for us in periods.us if us >= least.us)
         yield from ({PERIOD: us} for us in sorted(allowed, key=lambda us: abs(us - own_us)))
@@ -329,7 +329,7 @@ def rounded_up(us: float) -> float:
 
 def _fewer_nodes(network: Network) -> Iterator[Changes]:
     """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
-    counts = range(int(plain(network.nodes)) - 1, 0, -1)
+    counts = range(int(network.nodes) - 1, 0, -1)
     place = bisect_left(counts, x=True, key=lambda nodes: _holds(network, {NODES: nodes}))
     if counts:
         yield {NODES: counts[min(place, len(counts) - 1)]}
@@ -354,9 +354,9 @@ def cure(network: Network) -> Cure:
 def stands_in_the_way(network: Network, step: PlanStep) -> Need:
     """The constraint that a step does not hold, with its words."""
     after = changed(network, step.changes)
-    ratio = float(plain(after.slice_ratio))
+    ratio = float(after.slice_ratio)
     need = most_asking(step.unmet, ratio=ratio)
-    return need._replace(why=need.words(ratio=ratio, most_us=float(plain(after.period_us))))
+    return need._replace(why=need.words(ratio=ratio, most_us=float(after.period_us)))
 
 
 def changeable(network: Network) -> tuple[str, ...]:

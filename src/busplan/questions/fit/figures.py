@@ -12,7 +12,7 @@ from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, existing, is_everywhere, larger, plain, rounded_down, smaller, total
+from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,
     NOT_SHOWN,
@@ -49,7 +49,7 @@ class MostNodes(NamedTuple):
     @property
     def words(self) -> tuple[int, str]:
         """The number of nodes and the key of the limit, of plain numbers."""
-        return int(plain(self.nodes)), self.limits[int(plain(self.limit))].key
+        return int(self.nodes), self.limits[int(self.limit)].key
 
     def words_at(self, points: int) -> list[tuple[int, str]]:
         """The same at each point of arrays."""
@@ -100,7 +100,7 @@ def most_and_safe_nodes(
     if model != network.bus.deciding_model:
         return most, None
     # No more nodes are shown to fit than fit.
-    ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else plain(most.nodes)) + 1
+    ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else most.nodes) + 1
     return most, most_nodes(with_nodes, limits_to_be_safe(network), ceiling=min(ceiling, MAX_COUNT))
 
 
@@ -125,7 +125,7 @@ def most_nodes(
     order = sorted(range(len(limits)), key=lambda index: limits[index].is_slow)
     for place, index in enumerate(order):
         # One above the ceiling, so that a limit that allows the ceiling is not taken for the limit that sets it.
-        still_allowed = int(nodes.max() if hasattr(nodes, "max") else plain(nodes))
+        still_allowed = int(nodes.max() if hasattr(nodes, "max") else nodes)
         most[index] = _most_within(limits[index], with_nodes, still_allowed + 1)
         nodes = smaller(nodes, most[index])
         if is_everywhere(nodes < 1) and index < min(order[place + 1 :], default=index):
@@ -388,7 +388,7 @@ def figures(network: Network, *, model: str) -> FitFigures:
         **_plain_or_none(numbers),
         **decided,
         terms=terms,
-        binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else None,
+        binding_term=max(terms, key=lambda term: term.us).name if terms else None,
         exceeded=exceeded,
         fits=not exceeded,
         safe=bus.is_safe(network),
