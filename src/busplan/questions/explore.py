@@ -16,7 +16,7 @@ from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
-from busplan.questions.capacity.verdict import Fastest, Verdict, card, verdict_of
+from busplan.questions.capacity.verdict import Fastest, Verdict, verdict_of
 from busplan.questions.fit.grid import capacities
 from busplan.questions.fit.network import PERIOD, changed, varied_nodes
 from busplan.questions.map import (
@@ -235,5 +235,5 @@ def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
 def _card(answer: MapAnswer, verdict: Verdict | None, cell: Cell | NotDrawn) -> Card | None:
     if verdict is None or isinstance(cell, NotDrawn):
         return None
-    made, circle = card(verdict), circle_words(answer, cell)
+    made, circle = verdict.card, circle_words(answer, cell)
     return made._replace(lines=(*made.lines, *([("circle", circle)] if circle else [])))
