@@ -1,6 +1,6 @@
 """An answer is complete when it is returned: no form of it asks a bus, the fit, the search or the servo again.
 
-A form may ask the register of figures what a figure is called and which unit it has.
+A form may read the profile and what a record says of itself, and ask what a figure is called and which unit it has.
 """
 
 import sys
@@ -24,7 +24,8 @@ from busplan.forms import ENDINGS
 from busplan.gate.formats import FORMATS
 
 COMPUTE = ("busplan.buses", "busplan.questions.fit", "busplan.servo")
-REGISTER = "busplan.buses.figure"
+REGISTERS = ("busplan.buses", "busplan.buses.figure")
+"""Names of the kinds of bus, and of figures."""
 FILES = Path(__file__).parents[1] / "questions" / "import_" / "files"
 TABLE = Path(__file__).parents[2] / "profiles" / "table-1.csv"
 KINDS = (
@@ -123,7 +124,8 @@ def calls(draw: Callable[[], Any], allowed: set[CodeType]) -> set[str]:
 
     def seen(frame: FrameType, event: str, _: Any) -> None:
         room = frame.f_globals.get("__name__", "")
-        if event == "call" and room.startswith(COMPUTE) and room != REGISTER and frame.f_code not in allowed:
+        is_register = room in REGISTERS or room.endswith("section")
+        if event == "call" and room.startswith(COMPUTE) and not is_register and frame.f_code not in allowed:
             called.add(f"{room}.{frame.f_code.co_qualname}")
 
     sys.setprofile(seen)

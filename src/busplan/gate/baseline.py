@@ -22,8 +22,8 @@ from busplan.buses.figure import (
     Figure,
     by_key,
 )
-from busplan.buses.rule import RuleProblem, told_apart
-from busplan.english import first_of, plural, to_json
+from busplan.buses.rule import RuleProblem
+from busplan.english import first_of, plural, to_json, told_apart
 from busplan.errors import BusplanError
 from busplan.gate.finding import Subject
 from busplan.profile.document import LoadedProfile, override, read_bytes

@@ -256,15 +256,14 @@ def _deadline_sentence(
     us, deadline_us = (latest.phases[key] for key in keys)
     misses = "misses its deadline" if late == 1 else "miss their deadlines"
     is_kept = f"{late} of {len(due)} messages {misses}" if late else "Every message keeps its deadline"
+    limits = [limit for limit in bus.limits if limit.of_deadlines]
     not_shown = dict.fromkeys(
         limit.words(network)
         for network, verdict in zip(networks, deciding, strict=True)
-        for limit in bus.limits
-        if limit.of_deadlines and limit.key in (verdict.not_shown or ())
+        for limit in limits
+        if limit.key in (verdict.not_shown or ())
     )
-    is_broken = any(
-        limit.of_deadlines and limit.key in verdict.exceeded for limit in bus.limits for verdict in deciding
-    )
+    is_broken = any(limit.key in verdict.exceeded for limit in limits for verdict in deciding)
     state: State = "fails" if late else "neutral"
     why = f"; not shown: {'; '.join(not_shown)}" if not_shown else ""
     if not_shown and not is_broken:

@@ -28,7 +28,6 @@ from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.verdict import Change, Verdict, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS
-from busplan.sections.profile import Profile
 
 
 def capacity_report(answer: CapacityAnswer) -> Report:
@@ -47,7 +46,7 @@ def capacity_report(answer: CapacityAnswer) -> Report:
             "capacity",
             profile=name,
             results=results,
-            verdicts=[_verdict(verdict, answer.profile) for verdict in answer.verdicts],
+            verdicts=[_verdict(answer, verdict) for verdict in answer.verdicts],
         ),
         with_profile(name, records),
     )
@@ -165,7 +164,7 @@ def _change_record(change: Change) -> Record:
     }
 
 
-def _verdict(verdict: Verdict, profile: Profile) -> Record:
+def _verdict(answer: CapacityAnswer, verdict: Verdict) -> Record:
     change, figures, summary = verdict.change, verdict.deciding, verdict.card.whole
     lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
@@ -179,7 +178,7 @@ def _verdict(verdict: Verdict, profile: Profile) -> Record:
         **fields(figures, "available_us", "required_us", "margin_us"),
         **fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
         "uncertainty_parts": uncertainty_parts(figures),
-        "reserve": profile.limits.reserve,
+        "reserve": answer.profile.limits.reserve,
         "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],
         "not_applicable": {model: list(keys) for model, keys in verdict.not_applicable.items()},
         "cheapest_change": change and _change_record(change),

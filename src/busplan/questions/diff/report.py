@@ -101,7 +101,7 @@ def diff_report(answer: DiffAnswer) -> Report:
 
 def regression_words(answer: DiffAnswer, *, tolerance_percent: float) -> str:
     """Message that names the figures of B that are worse; empty if there are none."""
-    names = _names(answer, answer.regressions(tolerance_percent=tolerance_percent))
+    names = _names(answer.regressions(tolerance_percent=tolerance_percent))
     by = f" by more than {tolerance_percent:.12g} %" if tolerance_percent else ""
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}" if names else ""
 
@@ -130,19 +130,19 @@ def _verdict(side: DiffSide) -> str:
 
 
 def _judged(answer: DiffAnswer, judgement: Judgement) -> str:
-    names = _names(answer, answer.judged(judgement))
+    names = _names(answer.judged(judgement))
     more = len(names) - _MOST_NAMED
     shown = [*names[:_MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
     return f"{judgement} in {plural(len(names), 'figure')}: {listed(shown, 'and')}" if names else ""
 
 
-def _names(answer: DiffAnswer, figures: Sequence[ComparedFigure]) -> list[str]:
+def _names(figures: Sequence[ComparedFigure]) -> list[str]:
     """Names of figures, each once, with the timing model if only one judges it so."""
     parts: dict[str, list[str]] = {}
     for compared in figures:
         parts.setdefault(compared.figure.label, []).append(compared.part)
-    is_of_model = {label: len(of) == 1 and of[0] not in ("plan", "deciding") for label, of in parts.items()}
-    return [f"{label} ({of[0]})" if is_of_model[label] else label for label, of in parts.items()]
+    of_all = ["plan"], ["deciding"]
+    return [f"{label} ({of[0]})" if len(of) == 1 and of not in of_all else label for label, of in parts.items()]
 
 
 def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
