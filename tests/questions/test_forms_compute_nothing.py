@@ -113,9 +113,10 @@ def shown_in_a_notebook(answer: Any) -> None:
 
 def reads(records: set[type]) -> set[CodeType]:
     """What records say of themselves: their properties, and their methods without arguments."""
-    members = [member for kind in records for member in vars(kind).values()]
+    members = [member for kind in records for base in kind.__mro__ for member in vars(base).values()]
     functions = [member.fget if isinstance(member, property) else member for member in members]
-    return {one.__code__ for one in functions if isfunction(one) and one.__code__.co_argcount == 1}
+    codes = {one.__code__ for one in functions if isfunction(one) and one.__code__.co_argcount == 1}
+    return codes | {part for code in codes for part in code.co_consts if isinstance(part, CodeType)}
 
 
 def calls(draw: Callable[[], Any], allowed: set[CodeType]) -> set[str]:

@@ -73,7 +73,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
             for name in ("max_nodes", "safe_nodes"):
                 figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
         if not subject.profile.has_cycle:
-            for figure in _loads(capacity.register):
+            for figure in _loads(capacity.bus_figures):
                 figures[f"{capacity.timing_model}.{figure.key}"] = capacity.values()[figure.key]
     return {name: value for name, value in figures.items() if value is not None}
 

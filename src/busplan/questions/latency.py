@@ -284,7 +284,7 @@ def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:
 
 def _tables(answer: LatencyAnswer) -> Iterator[Block]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
-    register, deciding = answer.deciding[0].register, answer.deciding[0].timing_model
+    register, deciding = answer.deciding[0].bus_figures, answer.deciding[0].timing_model
     figures = [
         figure
         for figure in register.latency_table

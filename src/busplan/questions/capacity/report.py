@@ -76,7 +76,7 @@ def _table(answer: CapacityAnswer) -> Table:
         f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup and f'; {setup}'}",
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
-    rows = [row for row in _rows(first.deciding.register) if not (answer.profile.group and row[0].key in COUNTS)]
+    rows = [row for row in _rows(first.deciding.bus_figures) if not (answer.profile.group and row[0].key in COUNTS)]
     if not answer.profile.has_cycle:
         results = [figures.values() for figures in answer.results]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]

@@ -47,7 +47,7 @@ def sensitivity_report(answer: CapacityAnswer) -> Report:
             **verdict,
             "sensitivity": records,
             "reach": [reach._asdict() for reach in at.reaches],
-            "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.now.register),
+            "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.now.bus_figures),
         }
         for verdict, records, at in zip(report.document["verdicts"], effects, sensitivities, strict=True)
     ]
@@ -115,7 +115,7 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     yield _headline(sensitivity)
     if notes := tuple(Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note):
         yield Detail(notes, "why some changes do nothing here")
-    yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.now.register)
+    yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.now.bus_figures)
     if sensitivity.reaches:
         yield _reaches_table(sensitivity.reaches)
 

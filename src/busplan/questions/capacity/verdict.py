@@ -366,7 +366,7 @@ def _basis(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Line]
     if figures.terms:
         largest = max(figures.terms, key=lambda term: term.us)
         us = known_text(largest.us, figures.uncertainty_us)
-        yield "largest part", Sentence((f"{figures.register.term_label(largest.name)}, {us} us",))
+        yield "largest part", Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
         part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])

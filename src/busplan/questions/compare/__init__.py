@@ -27,9 +27,9 @@ from busplan.questions.fit.cure import SettingForPeriod, best_register, settings
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes, words_behind
 from busplan.questions.fit.graded import assumed_rates, given
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
-from busplan.questions.fit.network import at_period, changed, network_of, varied_nodes
+from busplan.questions.fit.network import at_period, changed, network_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
-from busplan.sections.profile import Profile
+from busplan.sections.profile import Profile, varied_nodes
 
 _ROUND_US: Final = 1000.0
 """Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""

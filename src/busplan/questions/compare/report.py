@@ -180,7 +180,7 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
         machine.safe.limited_by,
         Words(f"{figures.verdict}{unsafe}", state_of(machine.fits)),
         Sentence(margin_parts(figures, unit=False)),
-        figures.register.term_label(figures.binding_term),
+        figures.bus_figures.term_label(figures.binding_term),
         ", ".join(filter(None, (_values(new), count))) or "-",
     )
     return TableRow(cells)

@@ -211,7 +211,7 @@ class FitFigures:
     its type says.
     """
 
-    register: BusFigures
+    bus_figures: BusFigures
     """Figures of the kind of bus."""
     safety: Safety
     """Setting of the bus that is safe or not."""
@@ -296,7 +296,7 @@ class CapacityFigures(FitFigures):
     def by_key(self) -> dict[str, Any]:
         """The figures of the JSON document by key, in its order."""
         values = self.values()
-        named = {figure.key: values[figure.key] for figure in self.register.capacity}
+        named = {figure.key: values[figure.key] for figure in self.bus_figures.capacity}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
 
 
@@ -391,7 +391,7 @@ def figures(network: Network, *, model: str) -> FitFigures:
         numbers |= dict.fromkeys(_CERTAINTY_KEYS)
     own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
     return FitFigures(
-        register=bus.figures,
+        bus_figures=bus.figures,
         safety=bus.safety,
         timing_model=model,
         **_plain_or_none(numbers),

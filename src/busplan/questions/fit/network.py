@@ -16,27 +16,9 @@ from busplan.sourced import changed_constants
 PERIOD: Final = "cycle.period_us"
 
 
-class OfNetwork:
-    """What is about a network, and so about its profile."""
-
-    __slots__ = ()
-    network: Network
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
-
-
 def bus_of(profile: Profile) -> Bus:
     """The kind of bus that a profile describes."""
     return kind_named(profile.bus.kind)
-
-
-def varied_nodes(profile: Profile) -> ProfileGroup:
-    """The nodes whose number varies when axes are counted: all of them, or the group with the most axes."""
-    return max(profile.node_groups, key=lambda group: int(group.nodes * group.node.axes))
 
 
 def network_of(profile: Profile) -> Network:

@@ -139,7 +139,7 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
         "held_by": option.held_by,
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
-        **{key: values[key] for key in figures.register.planned},
+        **{key: values[key] for key in figures.bus_figures.planned},
         # Of the first nodes; a bus of messages alone has none.
         **{
             f"{kind}_bytes": next((int(group.bytes_of(kind)) for group in profile.node_groups), None)
@@ -167,7 +167,7 @@ def _row(option: Option) -> TableRow:
         option.title,
         "*" * option.recommended,
         settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
-        option.deciding.register.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
+        option.deciding.bus_figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
         *_margin(option),
         *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),

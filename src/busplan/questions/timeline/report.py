@@ -327,7 +327,7 @@ def _document(schedule: Schedule) -> JsonDocument:
         "timeline",
         profile=schedule.profile.name,
         **fields(figures, "timing_model", "period_us", "nodes"),
-        **{key: values[key] for key in figures.register.headings},
+        **{key: values[key] for key in figures.bus_figures.headings},
         cycle=schedule.drawn,
         common_multiple=schedule.cycles,
         distinct_cycles=None if distinct is None else [cycle._asdict() for cycle in distinct],
