@@ -211,6 +211,8 @@ class FitFigures:
     its type says.
     """
 
+    kind: str
+    """The kind of bus."""
     bus_figures: BusFigures
     """Figures of the kind of bus."""
     safety: Safety
@@ -391,6 +393,7 @@ def figures(network: Network, *, model: str) -> FitFigures:
         numbers |= dict.fromkeys(_CERTAINTY_KEYS)
     own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
     return FitFigures(
+        kind=bus.kind,
         bus_figures=bus.figures,
         safety=bus.safety,
         timing_model=model,
