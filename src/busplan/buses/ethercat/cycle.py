@@ -129,7 +129,7 @@ class EthercatCycle(BusCycle):
     def _overhead_bytes(self) -> Number:
         packed = self.packing
         headers = packed.datagrams_bytes - self.process_bytes
-        return packed.frames * overhead_bytes(packed.frames) + headers + packed.padding_bytes
+        return packed.frames * overhead_bytes() + headers + packed.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:

@@ -23,7 +23,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import CycleWithStarts
 from busplan.buses.ieee1394.timing import IdleTime, Phases, Responder, idle_time, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, is_off, larger, named, total, traced_with
+from busplan.elementwise import Number, is_off, larger, named, total
 from busplan.sections.base import TransactionKind
 
 
@@ -87,7 +87,7 @@ class BroadcastCycle(CycleWithStarts):
         return larger(self._clocks_us(c.FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
 
     def _clocks_us(self, clocks: Number) -> Number:
-        return traced_with(clocks, self.link.hops) / c.BROADCAST_CLOCK_MHZ
+        return clocks / c.BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
         """Wait of the next node after the broadcast of a node, where each has its own time [us].
@@ -159,7 +159,7 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
-        wait_us = traced_with(c.HUB_WAIT_US, self.network.nodes) + c.HUB_WAIT_PER_NODE_US * self.network.nodes
+        wait_us = c.HUB_WAIT_US + c.HUB_WAIT_PER_NODE_US * self.network.nodes
         return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
 
     @cached_property
@@ -228,6 +228,12 @@ class BroadcastCycle(CycleWithStarts):
             transaction_us=latency_us + (self.hub.idle_us + self.hub.host_us),
         )
 
+    def all_us(self, kind: TransactionKind) -> Number:
+        """The broadcasts of all nodes and the read of the hub; or the write of all commands [us]."""
+        if kind == "write":
+            return self.write.transaction_us
+        return self.boards_us + self.hub_wait.us + self.hub.transaction_us
+
     def longest(self, kind: TransactionKind) -> Phases:
         """The read of all data, or the write of all commands [us]."""
         return self.read if kind == "read" else self.write
@@ -236,8 +242,8 @@ class BroadcastCycle(CycleWithStarts):
         """The data of a node to the host, and a command to it; they are those of all nodes."""
         link = {"hops": self.link.hops, "gap_count": self.link.gap_count}
         before_hub = {"query_us": self.query_us, "boards_us": self.boards_us, "hub_wait_us": self.hub_wait.us}
-        read = {**link, **before_hub, **self.read._asdict()}
-        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict()}
+        read = {**link, **before_hub, **self.read._asdict(), "all_us": self.reads_us}
+        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict(), "all_us": self.writes_us}
         return tuple(
             latency
             for group in self.network.groups

@@ -7,7 +7,7 @@ from busplan.buses.cycle import BusEvent
 from busplan.buses.ieee1394.constants import BETA_SPEEDS, c, safe_gap_count
 from busplan.buses.ieee1394.timing import Answer, Delays, Link, Phases, Responder, TimingModelName, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, named, traced_with, worded
+from busplan.elementwise import Number, named, worded
 from busplan.sections.base import TransactionKind
 
 
@@ -51,7 +51,7 @@ def link_of(network: Network) -> Link:
     """Rate, gap count and distance of the farthest node."""
     bus = network.profile.bus
     return Link(
-        data_rate_mbit_s=traced_with(c.by_key("DATA_RATE_MBIT_S")[bus.speed], network.nodes),
+        data_rate_mbit_s=c.by_key("DATA_RATE_MBIT_S")[bus.speed],
         gap_count=named(gap_count_of(network), "gap_count", "g"),
         hops=named(hops_of(network), "hops", "H"),
         cable_length_m=bus.cable_length_m,
