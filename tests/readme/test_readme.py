@@ -17,8 +17,7 @@ from busplan.manual import FOLDER, page, topics
 from busplan.manual.tables import made_table
 from busplan.profile.document import decode, validate
 from busplan.profile.sources import load
-from busplan.questions.explain.derivation import figures_of
-from busplan.questions.explain.report import constant_rows
+from busplan.questions.explain.derivation import constant_rows, figures_of
 from tests.registers import COMMANDS
 
 Run = Callable[..., CompletedProcess[str]]

@@ -11,8 +11,9 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
-from busplan.buses.rule import RuleProblem, RuleSubject, told_apart
+from busplan.buses.rule import RuleProblem, RuleSubject
 from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, next_entry, smaller
+from busplan.english import told_apart
 from busplan.sourced import Grade
 
 Value = int | float | str

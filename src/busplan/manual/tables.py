@@ -14,8 +14,7 @@ from busplan.forms.markdown import code, table
 from busplan.profile.kinds import models_of
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.explain import explain
-from busplan.questions.explain.derivation import figures_of
-from busplan.questions.explain.report import constant_rows
+from busplan.questions.explain.derivation import constant_rows, figures_of
 from busplan.sections.machine import AxisOverride
 from busplan.sourced import short
 

@@ -36,6 +36,8 @@ class EmulateAnswer(Answer):
         The plan.
     content
         The recording, in the format of its kind of bus.
+    endings
+        Endings of the name of a file with it.
     cycles
         Its length; of messages alone in periods of the fastest.
     duration_us
@@ -44,6 +46,8 @@ class EmulateAnswer(Answer):
         Seed of its random numbers.
     faults
         Value of each fault, by name: how often, or how late [us].
+    described
+        What the machine does at each fault, and which figure shows it.
     inside
         Faults that lie inside the plan, so that `measured` finds nothing beyond it.
     unsure
@@ -52,24 +56,26 @@ class EmulateAnswer(Answer):
 
     profile: Profile
     content: bytes
+    endings: tuple[str, ...]
     cycles: int
     duration_us: float
     seed: int
     faults: Mapping[str, float]
-    inside: tuple[str, ...] = ()
-    unsure: tuple[str, ...] = ()
+    described: tuple[Fault, ...]
+    inside: tuple[str, ...]
+    unsure: tuple[str, ...]
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        recordings = dict.fromkeys(emulator_of(self.profile).endings, lambda: self.content)
+        recordings = dict.fromkeys(self.endings, lambda: self.content)
         return {**super()._contents(), **recordings}
 
     def report(self) -> Report:
         """What is in the recording."""
-        name, emulator = self.profile.name, emulator_of(self.profile)
+        name = self.profile.name
         length = f"{plural(self.cycles, 'cycle')}, {self.duration_us / 1e6:g} s, seed {self.seed}"
         lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It counts as no measurement."))]
         records = []
-        for fault, value in ((fault_named(emulator, key), value) for key, value in self.faults.items()):
+        for fault, value in zip(self.described, self.faults.values(), strict=True):
             often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
             is_inside = fault.name in self.inside
             shown = f"measured shows {fault.shown_as}"
@@ -136,8 +142,18 @@ def emulate(
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
     content = emulator.emulated(network, Emulation(number, random, values, origin))
     inside, unsure = _not_found(network, emulator, content, values)
-    shown = MappingProxyType(values)
-    return EmulateAnswer(network.profile, content, number, number * period_us, seed, shown, inside, unsure)
+    return EmulateAnswer(
+        network.profile,
+        content,
+        emulator.endings,
+        number,
+        number * period_us,
+        seed,
+        MappingProxyType(values),
+        tuple(fault_named(emulator, name) for name in values),
+        inside,
+        unsure,
+    )
 
 
 def _not_found(

@@ -19,9 +19,9 @@ from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
 from busplan.buses.limits import ExactLimit, Limit, nodes_limit
 from busplan.buses.network import Network
-from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules, told_apart
+from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules
 from busplan.elementwise import Number
-from busplan.english import plural
+from busplan.english import plural, told_apart
 from busplan.sections.base import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
