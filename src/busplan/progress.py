@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 Progress = Callable[[int, int], None]
-"""Call with the work done and the total work, made from time to time."""
+"""Function called from time to time with the work done and the total work."""
 _PARTS: Final = 1000
 """Steps of progress in a piece of work."""
 
