@@ -19,7 +19,7 @@ from busplan.forms.terminal import block_lines
 from busplan.sourced import changed_constants, constants_changed
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""Function that refuses a file whose library is not installed, by ending."""
+"""Functions that refuse a file whose library is not installed, by ending."""
 
 
 _Shown = TypeVar("_Shown")
@@ -49,7 +49,7 @@ class Answer(ABC):
     __slots__ = ()
 
     def __init_subclass__(cls) -> None:
-        """Draw with the constants that were changed in the profile, for a report may compute."""
+        """Make reports and drawings, which may compute, use the constants that were changed in the profile."""
         super().__init_subclass__()
         for name in ("report", "drawing"):
             if name in vars(cls):
@@ -61,13 +61,13 @@ class Answer(ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document of the command's `--format json` as new plain data."""
-        # Parse the text, so that both are equal whatever the types of the figures.
+        # The text is parsed, so that both are equal whatever the types of the figures.
         document: dict[str, Any] = json.loads(self.to_json())
         return document
 
     @property
     def html(self) -> str:
-        """The page of the command's `--format html`: one file without network or script."""
+        """The page of `--format html`: one file without network or script."""
         return render(self._named(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -139,10 +139,10 @@ class Answer(ABC):
 
     @abstractmethod
     def report(self) -> Report:
-        """The answer in blocks, from which every form but JSON and CSV is written."""
+        """The answer in blocks, from which all forms but JSON and CSV are written."""
 
     def _named(self) -> Report:
-        """The report, which names the constants that were changed, as the command line names --set."""
+        """The report with the changed constants named, as the command line names --set."""
         profile = _profile_of(self)
         if profile is None or not profile.constants:
             return self.report()

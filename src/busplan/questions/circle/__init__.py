@@ -239,7 +239,7 @@ def circle_test(
     contributions
         If True, remove each error source in turn, and rank them.
     progress
-        Call with the steps simulated and the steps known to be needed, made from time to time.
+        Function called from time to time with the steps simulated and the steps known to be needed.
 
     Returns
     -------

@@ -39,12 +39,12 @@ _INPUTS: Final = (
     TableColumn("grade", kind="words", rank=3, leaves="below"),
     TableColumn("source", kind="words", rank=4, leaves="below", wraps=True),
 )
-"""Columns of an input, and of how well it is known."""
+"""Columns of an input and its grade."""
 _KNOWN: Final = tuple(
     column._replace(is_detail=True) if column.heading == "source" else column._replace(leaves="out")
     for column in _INPUTS
 )
-"""The same, the source only in a whole answer."""
+"""Columns of an input, with the source only in a whole answer."""
 _MOST_INPUTS: Final = 8
 """Inputs in an answer that is not whole."""
 _SYMBOL: Final = TableColumn("symbol", kind="words", rank=1, leaves="below")
@@ -66,7 +66,7 @@ _FIGURES: Final = (
 def assumptions_report(
     profile: Profile, assumptions: Sequence[Input], figures: Sequence[tuple[CommandName, Figure]]
 ) -> Report:
-    """Report of `explain PROFILE`: what the verdict rests on, and the figures that can be explained."""
+    """Report of `explain PROFILE`: the inputs on which the verdict rests, and the figures that can be explained."""
     inputs = (
         TableRow((*_input_cells(given), given.meaning), is_detail=number >= _MOST_INPUTS)
         for number, given in enumerate(assumptions)
@@ -101,7 +101,7 @@ def assumptions_report(
 
 
 def equation_rows() -> list[Record]:
-    """One row for each equation: numbers, formula, function and source."""
+    """Rows of equations: numbers, formula, function and source."""
     return [
         {
             "reference": equation.reference,
@@ -114,7 +114,7 @@ def equation_rows() -> list[Record]:
 
 
 def constant_rows(bus: Bus) -> list[Record]:
-    """One row for each constant: value, unit, grade and source."""
+    """Rows of constants: value, unit, grade and source."""
     return [
         {"name": name, "value": float(constant), **fields(constant, "unit", "grade", "source", "meaning")}
         for name, constant in bus.constants.items()
@@ -122,15 +122,7 @@ def constant_rows(bus: Bus) -> list[Record]:
 
 
 def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:
-    """Report of `explain PROFILE FIGURE` with a section for each derivation.
-
-    Parameters
-    ----------
-    name
-        Name of the profile.
-    derivations
-        One or more.
-    """
+    """Report of `explain PROFILE FIGURE`, with a section for each of one or more derivations."""
     figures = dict.fromkeys(derivation.figure.key for derivation in derivations)
     return Report(
         Sentence(("Where ", Code(", ".join(figures)), " of ", Code(name), " comes from")),
@@ -154,7 +146,7 @@ def _record(derivation: Derivation) -> Record:
 
 
 def _step_records(derivation: Derivation) -> Iterator[Record]:
-    """One row for each step; a figure that is itself an input has one row, without a formula."""
+    """Rows of steps; a figure that is itself an input has one row, without a formula."""
     figure = derivation.figure
     itself = Step(figure.key, figure.symbol, figure.reference, "", "", derivation.value, figure.unit)
     for number, step in enumerate(derivation.steps or (itself,), start=1):
@@ -168,7 +160,7 @@ def _step_records(derivation: Derivation) -> Iterator[Record]:
 
 
 def _sections(name: str, derivations: Iterable[Derivation]) -> Iterator[Chapter]:
-    """A section for each derivation; inputs that several have stand once."""
+    """Sections of derivations; inputs that several share are listed once."""
     first: dict[tuple[Input, ...], Derivation] = {}
     for derivation in derivations:
         earlier = first.setdefault(derivation.inputs, derivation)
@@ -182,7 +174,7 @@ def _of(derivation: Derivation) -> str:
 
 
 def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
-    """The result, its meaning, every step to it, and the inputs below them."""
+    """Section with the result, its meaning, every step to it, and the inputs below them."""
     figure = derivation.figure
     period = () if derivation.period_us is None else (" at ", period_value(derivation.period_us))
     result = _result(derivation.value, figure.key, figure.unit)
@@ -196,11 +188,11 @@ def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
 
 
 _MOST_STEPS: Final = 4
-"""Steps of a derivation that any answer shows whole."""
+"""Steps of the longest derivation that every answer shows whole."""
 
 
 def _last_step(derivation: Derivation) -> Iterator[Block]:
-    """The last step, the steps that it takes its numbers from, and the inputs that are known the least."""
+    """Last step, the steps from which it takes its numbers, and the inputs that are known the least."""
     *before, last = derivation.steps or (None,)
     if last is not None:
         used = [step for step in before if re.search(rf"(?<!\w){re.escape(step.symbol)}(?!\w)", last.formula)]
@@ -220,7 +212,7 @@ def _last_step(derivation: Derivation) -> Iterator[Block]:
 
 
 def _plays_a_part(given: Input, derivation: Derivation) -> bool:
-    """Whether an input plays a part in a figure of a transaction: one of a message that no step names does not."""
+    """Whether an input matters to a transaction's figure. One of a message that no step names does not."""
     section, _, rest = given.name.partition(".")
     name = rest.rpartition(".")[0]
     if section != "message" or derivation.transaction in (None, name):
@@ -233,7 +225,7 @@ def _result(value: object, key: str, unit: str) -> ShownValue | Words:
 
 
 def _step(step: Step) -> CalculationStep:
-    """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
+    """A line in symbols and one in numbers, without a line that repeats its neighbour."""
     result = _result(step.value, step.key, step.unit)
     text = result.text if isinstance(result, Words) else figure_text(result)
     formula = "" if step.formula in (step.symbol, text) else step.formula

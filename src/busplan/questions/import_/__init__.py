@@ -122,7 +122,7 @@ def import_profile(
     bit_rate_kbit_s
         Bit rate of a CAN bus, instead of that of any file [kbit/s]; required for a log that does not show it.
     progress
-        Call with the bytes read of a log and the size of its file [bytes].
+        Function called with the bytes read of a log and the size of its file [bytes].
 
     Returns
     -------
