@@ -131,7 +131,7 @@ def check(
     (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0, suppressed=3))
     """
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
-    _ = changed.changed_constants  # Refuse constants that no kind of bus has once, not for each file.
+    _ = changed.changed_constants  # Unknown constants are refused here, once for all files.
     recorded = None if baseline is None else _recorded(baseline)
     collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
     if recording is not None and len(collection.sources) + len(profiles) != 1:

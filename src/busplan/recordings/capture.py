@@ -66,7 +66,7 @@ class CapturedPackets(NamedTuple):
 
 @dataclass
 class CaptureNotes:
-    """Notes on a file besides its packets."""
+    """Facts on a capture besides its packets: counts, marks and damage."""
 
     packets: int = 0
     left_out: int = 0

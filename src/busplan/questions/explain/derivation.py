@@ -81,12 +81,12 @@ class Derivation:
 
 
 class Wanted(NamedTuple):
-    """Figures for a name."""
+    """Figures and transactions for which a name stands."""
 
     command: CommandName
     figures: tuple[Figure, ...]
     transactions: tuple[str, ...] | None = None
-    """Transactions for the name; None for all."""
+    """Transactions for which the name stands; None for all."""
 
 
 def derive(
@@ -237,7 +237,7 @@ def latency_names(network: Network) -> tuple[str, ...]:
 
 
 def wanted(name: str, network: Network) -> Wanted:
-    """Figures for a name.
+    """Figures and transactions for which a name stands.
 
     The name is a key ("required_us"), also after its command ("latency.gaps_us"); the number of an equation ("(11)");
     the label or the symbol of a figure in tables ("arbitration"); or the name of a transaction, a message or a group.
