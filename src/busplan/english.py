@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
+from typing import Final
 
 _MOST_NEAR = 3
 """Near names in one question, at most."""
@@ -133,3 +134,21 @@ def first_of(words: Sequence[str], most: int, *, by: str = ", ") -> str:
     """
     more = f" and {len(words) - most:,} more" if len(words) > most else ""
     return by.join(words[:most]) + more
+
+
+_MOST_DECIMALS: Final = 9
+
+
+def told_apart(first: float, second: float) -> tuple[str, str]:
+    """Write two numbers with one decimal, or with as many as tell them apart.
+
+    Examples
+    --------
+    >>> told_apart(348.461939453, 250.0), told_apart(250.0004, 250.0)
+    (('348.5', '250.0'), ('250.0004', '250.0000'))
+    """
+    for decimals in range(1, _MOST_DECIMALS + 1):
+        texts = f"{first:.{decimals}f}", f"{second:.{decimals}f}"
+        if texts[0] != texts[1]:
+            return texts
+    return f"{first:.1f}", f"{second:.1f}"

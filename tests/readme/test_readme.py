@@ -23,8 +23,7 @@ from busplan.profile.document import decode, validate
 from busplan.profile.kinds import models_of
 from busplan.profile.sources import load
 from busplan.questions.circle import CIRCLE_BY_KEY
-from busplan.questions.explain.derivation import figures_of
-from busplan.questions.explain.report import constant_rows, equation_rows
+from busplan.questions.explain.derivation import constant_rows, equation_rows, figures_of
 from busplan.sections.machine import AxisOverride
 from busplan.sourced import short
 from tests.registers import COMMANDS

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
+from busplan.english import told_apart
 from busplan.sourced import Sourced, read_toml
 
 if TYPE_CHECKING:
@@ -120,24 +121,6 @@ def contradicts(fits: bool, figures: RuleFigures) -> bool:
         return False
     is_shown = figures.verdict == "fits" or (figures.margin_corrected_us or 0) >= (figures.uncertainty_us or 0)
     return not is_shown if fits else figures.verdict == "fits"
-
-
-_MOST_DECIMALS: Final = 9
-
-
-def told_apart(first: float, second: float) -> tuple[str, str]:
-    """Write two numbers with one decimal, or with as many as tell them apart.
-
-    Examples
-    --------
-    >>> told_apart(348.461939453, 250.0), told_apart(250.0004, 250.0)
-    (('348.5', '250.0'), ('250.0004', '250.0000'))
-    """
-    for decimals in range(1, _MOST_DECIMALS + 1):
-        texts = f"{first:.{decimals}f}", f"{second:.{decimals}f}"
-        if texts[0] != texts[1]:
-            return texts
-    return f"{first:.1f}", f"{second:.1f}"
 
 
 def overrun(figures: RuleFigures) -> str:

@@ -18,11 +18,12 @@ from busplan.buses.figure import (
     MAX_NODES,
     SAFE_AXES,
     SAFE_NODES,
+    BusFigures,
     Figure,
     by_key,
 )
-from busplan.buses.rule import RuleProblem, told_apart
-from busplan.english import first_of, plural, to_json
+from busplan.buses.rule import RuleProblem
+from busplan.english import first_of, plural, to_json, told_apart
 from busplan.errors import BusplanError
 from busplan.gate.finding import Subject
 from busplan.profile.document import LoadedProfile, override, read_bytes
@@ -72,7 +73,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
             for name in ("max_nodes", "safe_nodes"):
                 figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
         if not subject.profile.has_cycle:
-            for figure in _loads(capacity.kind):
+            for figure in _loads(capacity.bus_figures):
                 figures[f"{capacity.timing_model}.{figure.key}"] = capacity.values()[figure.key]
     return {name: value for name, value in figures.items() if value is not None}
 
@@ -83,9 +84,9 @@ def keys_of(profile: Profile) -> dict[str, object]:
     return {key: value for key, value in values if key not in _TEXT_KEYS}
 
 
-def _loads(kind: str) -> Iterable[Figure]:
+def _loads(register: BusFigures) -> Iterable[Figure]:
     """Figures of a kind of bus that are worse when larger, as the load."""
-    return (figure for figure in kind_named(kind).figures.compared if figure.better == "less")
+    return (figure for figure in register.compared if figure.better == "less")
 
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -263,7 +264,7 @@ def _figure(name: str) -> Figure:
 def _figures() -> Mapping[str, Figure]:
     """Figures of a baseline by key, in the order in which a finding names them."""
     margins = (MARGIN_CORRECTED, SAFE_NODES, SAFE_AXES, MARGIN, MAX_NODES, MAX_AXES)
-    return by_key((*margins, *chain.from_iterable(map(_loads, kind_names()))))
+    return by_key((*margins, *chain.from_iterable(_loads(kind_named(kind).figures) for kind in kind_names())))
 
 
 def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, ChangedValue]:

@@ -5,8 +5,8 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 from busplan.buses.limits import Value
-from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity, told_apart
-from busplan.english import listed, printable
+from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity
+from busplan.english import listed, printable, told_apart
 from busplan.gate.rules import (
     CIRCLE,
     IMPOSSIBLE_CIRCLE,

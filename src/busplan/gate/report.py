@@ -12,8 +12,8 @@ from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from busplan import __version__
-from busplan.buses.rule import Rule, Severity, told_apart
-from busplan.english import nouns, plural, printable, printable_lines, to_json
+from busplan.buses.rule import Rule, Severity
+from busplan.english import nouns, plural, printable, printable_lines, to_json, told_apart
 from busplan.forms import markdown, terminal
 from busplan.forms.blocks import Code, JsonDocument, Report, Sentence, State, count_value, joined, sentence
 from busplan.forms.lines import BLANK, Line, Mark, Tone, plain_text, styled_text

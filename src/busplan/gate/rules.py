@@ -8,8 +8,8 @@ from typing import Any, Final
 from busplan.buses import kind_named, kind_names
 from busplan.buses.bus import Bus
 from busplan.buses.limits import NODE, busy_words, slow_groups
-from busplan.buses.rule import Check, Mending, Rule, RuleProblem, RuleSubject, margin, overrun, read_rules, told_apart
-from busplan.english import did_you_mean
+from busplan.buses.rule import Check, Mending, Rule, RuleProblem, RuleSubject, margin, overrun, read_rules
+from busplan.english import did_you_mean, told_apart
 from busplan.errors import BusplanError, ProblemKind
 from busplan.forms.blocks import (
     Block,

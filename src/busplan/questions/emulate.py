@@ -34,6 +34,8 @@ class EmulateAnswer(Answer):
     """The plan."""
     content: bytes
     """Recording in the format of its kind of bus."""
+    endings: tuple[str, ...]
+    """Endings of the name of a file with the recording."""
     cycles: int
     """Length of the recording [cycles]; for messages alone, periods of the fastest one."""
     duration_us: float
@@ -42,22 +44,24 @@ class EmulateAnswer(Answer):
     """Seed of the random numbers."""
     faults: Mapping[str, float]
     """Value of each fault by name: its number in the recording, or its delay [us]."""
-    inside: tuple[str, ...] = ()
+    described: tuple[Fault, ...]
+    """Behaviour of the machine at each fault, and the figure that shows it."""
+    inside: tuple[str, ...]
     """Faults inside the plan, so that `measured` finds nothing beyond it."""
-    unsure: tuple[str, ...] = ()
+    unsure: tuple[str, ...]
     """Faults beyond the plan by less than its uncertainty, so that `measured` does not show them."""
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        recordings = dict.fromkeys(emulator_of(self.profile).endings, lambda: self.content)
+        recordings = dict.fromkeys(self.endings, lambda: self.content)
         return {**super()._contents(), **recordings}
 
     def report(self) -> Report:
         """Contents of the recording."""
-        name, emulator = self.profile.name, emulator_of(self.profile)
+        name = self.profile.name
         length = f"{plural(self.cycles, 'cycle')}, {self.duration_us / 1e6:g} s, seed {self.seed}"
         lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It counts as no measurement."))]
         records = []
-        for fault, value in ((fault_named(emulator, key), value) for key, value in self.faults.items()):
+        for fault, value in zip(self.described, self.faults.values(), strict=True):
             often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
             is_inside = fault.name in self.inside
             shown = f"measured shows {fault.shown_as}"
@@ -125,8 +129,18 @@ def emulate(
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
     content = emulator.emulated(network, Emulation(number, random, values, origin))
     inside, unsure = _not_found(network, emulator, content, values)
-    shown = MappingProxyType(values)
-    return EmulateAnswer(network.profile, content, number, number * period_us, seed, shown, inside, unsure)
+    return EmulateAnswer(
+        network.profile,
+        content,
+        emulator.endings,
+        number,
+        number * period_us,
+        seed,
+        MappingProxyType(values),
+        tuple(fault_named(emulator, name) for name in values),
+        inside,
+        unsure,
+    )
 
 
 def _not_found(

@@ -16,9 +16,9 @@ from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
-from busplan.questions.capacity.verdict import Fastest, Verdict, card, verdict_of
+from busplan.questions.capacity.verdict import Fastest, Verdict, verdict_of
 from busplan.questions.fit.grid import capacities
-from busplan.questions.fit.network import PERIOD, changed, varied_nodes
+from busplan.questions.fit.network import PERIOD, changed
 from busplan.questions.map import (
     Along,
     Cell,
@@ -34,6 +34,7 @@ from busplan.questions.map import (
 )
 from busplan.questions.map.report import circle_words, map_document, map_drawing, title_of, value_text
 from busplan.sections.base import TRANSACTION_KINDS, value_at
+from busplan.sections.profile import Profile, varied_nodes
 
 MOST_VALUES: Final = 32
 """Most values of a slider: their cells are large enough to be chosen."""
@@ -49,8 +50,8 @@ class ExploreAnswer(Answer):
 
     Parameters
     ----------
-    network
-        The network of the profile itself: this design.
+    profile
+        The profile itself: this design.
     over
         The third direction; None where two keys alone vary.
     maps
@@ -59,17 +60,17 @@ class ExploreAnswer(Answer):
         For each map, row by row, the card of each cell; None where a setting cannot exist.
     """
 
-    network: Network
+    profile: Profile
     over: Direction | None
     maps: tuple[MapAnswer, ...]
     cards: tuple[tuple[Card | None, ...], ...]
 
     def report(self) -> Report:
         """The answer in blocks: sliders on a page of HTML, the map of this design in every other form."""
-        number = 0 if self.over is None else _own_place(self.over, self.network)
+        number = 0 if self.over is None else _own_place(self.over, self.profile)
         here = self.maps[number]
         up, across = here.directions
-        row, column = _own_place(up, self.network), _own_place(across, self.network)
+        row, column = _own_place(up, self.profile), _own_place(across, self.profile)
         cards, columns = self.cards[number], len(across.values)
         # The profile's own values, unless these are no setting here.
         place, first = min(
@@ -85,7 +86,7 @@ class ExploreAnswer(Answer):
         )
         drawings = tuple(map_drawing(answer, frame=(row, column)) for answer in self.maps)
         explorer = Explorer(sliders, self.cards, first, drawings, number, tuple(here.report().blocks))
-        name = self.network.profile.name
+        name = self.profile.name
         return Report(
             Sentence(("What a change does to ", Code(name))),
             (explorer,),
@@ -97,8 +98,8 @@ class ExploreAnswer(Answer):
     def _document(self) -> JsonDocument:
         return document(
             "explore",
-            profile=self.network.profile.name,
-            timing_model=self.network.bus.deciding_model,
+            profile=self.profile.name,
+            timing_model=self.maps[0].timing_model,
             over=None if self.over is None else {"key": self.over.key, "values": list(self.over.values)},
             maps=[{"over": value, **whole} for value, whole in self._documents()],
         )
@@ -111,9 +112,9 @@ class ExploreAnswer(Answer):
             yield value, {**whole, "cells": [{**further, **cell} for cell in whole["cells"]]}
 
 
-def _own_place(along: Direction, network: Network) -> int:
+def _own_place(along: Direction, profile: Profile) -> int:
     """Index of the profile's own value; 0 if it is not among the values."""
-    own = design_value(along.key, network)
+    own = design_value(along.key, profile)
     return along.values.index(own) if own in along.values else 0
 
 
@@ -183,7 +184,7 @@ def explore(
         maps.append(answer)
         places = product(range(len(answer.rows)), range(len(answer.rows[0])))
         cards.append(tuple(_card(answer, judged.get(place), answer.rows[place[0]][place[1]]) for place in places))
-    return ExploreAnswer(network, third, tuple(maps), tuple(cards))
+    return ExploreAnswer(network.profile, third, tuple(maps), tuple(cards))
 
 
 def _judged(grid: Grid, progress: Progress) -> dict[tuple[int, int], Verdict]:
@@ -235,5 +236,5 @@ def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
 def _card(answer: MapAnswer, verdict: Verdict | None, cell: Cell | NotDrawn) -> Card | None:
     if verdict is None or isinstance(cell, NotDrawn):
         return None
-    made, circle = card(verdict), circle_words(answer, cell)
+    made, circle = verdict.card, circle_words(answer, cell)
     return made._replace(lines=(*made.lines, *([("circle", circle)] if circle else [])))

@@ -44,7 +44,7 @@ from busplan.questions.base.sentences import (
     with_profile,
 )
 from busplan.questions.fit.figures import FitFigures, figures
-from busplan.questions.fit.network import with_payloads
+from busplan.questions.fit.network import not_applicable, warnings_of, with_payloads
 from busplan.sections.cycle import TableExecution
 from busplan.sections.profile import Profile
 
@@ -70,29 +70,29 @@ class LatencyAnswer(Answer):
     ----------
     profile
         The network.
-    networks
-        The network with each payload; without payloads as the profile has it.
+    subject
+        What has these latencies, in words.
     tables
-        The transactions of each of these networks, each under every timing model.
+        The transactions with each payload, each under every timing model; without payloads as the profile has them.
     deciding
-        The verdict on each of these networks.
+        The verdict with each payload.
+    deadlines
+        Whether all messages keep their deadlines, and which is the closest; empty where there are none.
+    notes
+        Timing models that do not apply, the grade of the execution times, and warnings.
     """
 
     profile: Profile
-    networks: tuple[Network, ...]
+    subject: str
     tables: tuple[tuple[Transaction, ...], ...]
     deciding: tuple[FitFigures, ...]
+    deadlines: tuple[Sentence, ...]
+    notes: tuple[Sentence, ...]
 
     @property
     def transactions(self) -> tuple[Transaction, ...]:
         """One transaction for each payload, kind and timing model, nested in this order, with its `phases`."""
         return tuple(transaction for table in self.tables for transaction in table)
-
-    @property
-    def subject(self) -> str:
-        """What has these latencies, in words."""
-        network = self.networks[0]
-        return network.bus.latency_subject(network)
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -161,7 +161,14 @@ def latency(
         networks = [with_payloads(network, [(size, size)] * len(network.profile.node_groups)) for size in sizes]
     tables = tuple(_transactions(variant, models) for variant in networks)
     deciding = tuple(figures(variant, model=variant.bus.deciding_model) for variant in networks)
-    return LatencyAnswer(network.profile, tuple(networks), tables, deciding)
+    return LatencyAnswer(
+        network.profile,
+        networks[0].bus.latency_subject(networks[0]),
+        tables,
+        deciding,
+        tuple(_deadline_sentence(networks, tables, deciding)),
+        tuple(_notes(networks)),
+    )
 
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
@@ -214,26 +221,32 @@ def _records(transactions: Sequence[Transaction]) -> list[Record]:
 
 def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
     """Phases of each transaction, the timing models side by side; one table for each payload."""
-    network = answer.networks[0]
-    yield from _deadline_sentence(answer)
+    yield from answer.deadlines
     yield from _tables(answer)
     yield Sentence((Code(answer.profile.name), f": {answer.subject}."))
-    for model in network.bus.timing_models:
-        if keys := network.bus.cannot_express(network, model=model.name):
-            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
+    yield from answer.notes
+
+
+def _notes(networks: Sequence[Network]) -> Iterator[Sentence]:
+    """Timing models that do not apply, the grade of the execution times, and warnings."""
+    network = networks[0]
+    for model, keys in not_applicable(network).items():
+        yield Sentence((f"The {model} model is not applicable: it has no {', '.join(keys)}.",))
     yield from execution_sentence(network, of_latency=True)
-    broken = (limit.words(network) for network in answer.networks for limit in network.bus.broken(network))
-    yield from (Sentence((f"Warning: {words}.",), "warns") for words in dict.fromkeys(broken))
-    yield from warning_sentences(network)
+    broken = (limit.words(variant) for variant in networks for limit in variant.bus.broken(variant))
+    yield from warning_sentences((*dict.fromkeys(broken), *warnings_of(network)))
 
 
-def _deadline_sentence(answer: LatencyAnswer) -> Iterator[Sentence]:
+def _deadline_sentence(
+    networks: Sequence[Network], tables: Sequence[Sequence[Transaction]], deciding: Sequence[FitFigures]
+) -> Iterator[Sentence]:
     """Say whether all transactions keep their deadlines by the model of the verdict, and which is the closest."""
-    bus = answer.networks[0].bus
+    bus = networks[0].bus
     keys, model = bus.figures.deadlines, bus.deciding_model
     due = [
         (share, transaction)
-        for transaction in answer.transactions
+        for table in tables
+        for transaction in table
         if transaction.timing_model == model and (share := _share(transaction, keys))
     ]
     if not keys or not due:
@@ -243,15 +256,14 @@ def _deadline_sentence(answer: LatencyAnswer) -> Iterator[Sentence]:
     us, deadline_us = (latest.phases[key] for key in keys)
     misses = "misses its deadline" if late == 1 else "miss their deadlines"
     is_kept = f"{late} of {len(due)} messages {misses}" if late else "Every message keeps its deadline"
+    limits = [limit for limit in bus.limits if limit.of_deadlines]
     not_shown = dict.fromkeys(
         limit.words(network)
-        for network, deciding in zip(answer.networks, answer.deciding, strict=True)
-        for limit in bus.limits
-        if limit.of_deadlines and limit.key in (deciding.not_shown or ())
+        for network, verdict in zip(networks, deciding, strict=True)
+        for limit in limits
+        if limit.key in (verdict.not_shown or ())
     )
-    is_broken = any(
-        limit.of_deadlines and limit.key in deciding.exceeded for limit in bus.limits for deciding in answer.deciding
-    )
+    is_broken = any(limit.key in verdict.exceeded for limit in limits for verdict in deciding)
     state: State = "fails" if late else "neutral"
     why = f"; not shown: {'; '.join(not_shown)}" if not_shown else ""
     if not_shown and not is_broken:
@@ -272,7 +284,7 @@ def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:
 
 def _tables(answer: LatencyAnswer) -> Iterator[Block]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
-    register = answer.networks[0].bus.figures
+    register, deciding = answer.deciding[0].bus_figures, answer.deciding[0].timing_model
     figures = [
         figure
         for figure in register.latency_table
@@ -281,7 +293,7 @@ def _tables(answer: LatencyAnswer) -> Iterator[Block]:
     if register.has_many_transactions:
         yield from _by_transaction(answer, figures, register.deadlines)
         return
-    caption, deciding = Sentence((f"Phases in us, {answer.subject}",)), answer.networks[0].bus.deciding_model
+    caption = Sentence((f"Phases in us, {answer.subject}",))
     for table in answer.tables:
         columns = [
             FigureColumn(
@@ -333,7 +345,7 @@ def _by_transaction(
         TableColumn("message", kind="words"),
         *(TableColumn(figure.label, rank=_rank(figure, deadlines)) for figure in figures),
     )
-    deciding = answer.networks[0].bus.deciding_model
+    deciding = answer.deciding[0].timing_model
     for table in answer.tables:
         has_deciding = any(transaction.timing_model == deciding for transaction in table)
         for models, of_models in _by_models(table, figures):

@@ -150,3 +150,8 @@ def _payloads(nodes: ProfileGroup, place: int) -> Iterator[tuple[str, int, str]]
     for kind in TRANSACTION_KINDS:
         key, size = nodes.payload.key_of(kind), int(nodes.bytes_of(kind))
         yield f"{section}.{key}", size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
+
+
+def varied_nodes(profile: Profile) -> ProfileGroup:
+    """The nodes whose number varies when axes are counted: all of them, or the group with the most axes."""
+    return max(profile.node_groups, key=lambda group: int(group.nodes * group.node.axes))

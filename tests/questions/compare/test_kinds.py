@@ -206,7 +206,7 @@ def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
     assert "gap count 5 is unsafe for 8 hops" in unsafe.smallest.need.why
     # Its own bus stays as it is: what mends it is on the card.
     assert unsafe.best is None
-    (verdict,) = busplan.capacity(unsafe.network.profile).to_dict()["verdicts"]
+    (verdict,) = busplan.capacity(unsafe.profile).to_dict()["verdicts"]
     assert verdict["cheapest_change"]["changes"] == {"bus.gap_count": 21}
 
 

@@ -4,10 +4,10 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from functools import partial, wraps
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from busplan.errors import BusplanError
 from busplan.extras import require_pyarrow, require_resvg
@@ -16,28 +16,9 @@ from busplan.forms import ENDINGS, Form, ending_expected, render
 from busplan.forms.blocks import Report, first_drawing
 from busplan.forms.charts import Drawing
 from busplan.forms.terminal import block_lines
-from busplan.sourced import changed_constants, constants_changed
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
 """Functions that refuse a file whose library is not installed, by ending."""
-
-
-_Shown = TypeVar("_Shown")
-
-
-def _with_constants(method: Callable[..., _Shown]) -> Callable[..., _Shown]:
-    @wraps(method)
-    def drawn(answer: Any, *given: Any, **named: Any) -> _Shown:
-        profile = _profile_of(answer)
-        with constants_changed(changed_constants() if profile is None else profile.constants):
-            return method(answer, *given, **named)
-
-    return drawn
-
-
-def _profile_of(answer: Any) -> Any:
-    """The profile of an answer; None if it has none, or several."""
-    return getattr(answer, "profile", None) or getattr(getattr(answer, "network", None), "profile", None)
 
 
 class Answer(ABC):
@@ -47,13 +28,6 @@ class Answer(ABC):
     """
 
     __slots__ = ()
-
-    def __init_subclass__(cls) -> None:
-        """Make reports and drawings, which may compute, use the constants that were changed in the profile."""
-        super().__init_subclass__()
-        for name in ("report", "drawing"):
-            if name in vars(cls):
-                setattr(cls, name, _with_constants(vars(cls)[name]))
 
     def to_json(self) -> str:
         """Return the document of the command's `--format json` as text."""
@@ -143,7 +117,7 @@ class Answer(ABC):
 
     def _named(self) -> Report:
         """The report with the changed constants named, as the command line names --set."""
-        profile = _profile_of(self)
+        profile = getattr(self, "profile", None)
         if profile is None or not profile.constants:
             return self.report()
         from busplan.questions.base.arguments import key_changes

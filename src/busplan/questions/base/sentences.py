@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION, Figure
 from busplan.buses.limits import Value as BusValue
 from busplan.buses.network import Network
-from busplan.buses.published import parts_tested
+from busplan.buses.published import Tested
 from busplan.forms.blocks import (
     Code,
     JsonDocument,
@@ -27,7 +27,8 @@ from busplan.forms.numbers import known_decimals, known_text
 from busplan.profile.changes import KeyChanges
 from busplan.profile.edit import value_text
 from busplan.questions.fit.certainty import TIME
-from busplan.questions.fit.figures import FitFigures, limits_behind
+from busplan.questions.fit.figures import FitFigures
+from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
@@ -60,9 +61,8 @@ def change_meanings(bus: "Bus") -> dict[str, str]:
     return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
 
 
-def warning_sentences(network: Network) -> Iterator[Sentence]:
-    """Warnings for a network with its own number of nodes; they hold whatever the verdict."""
-    warnings = network.bus.warnings(network, nodes=[int(network.nodes)])
+def warning_sentences(warnings: Iterable[str]) -> Iterator[Sentence]:
+    """Warnings that hold whatever the verdict."""
     return (Sentence((f"Warning: {words}.",), "warns") for words in warnings)
 
 
@@ -83,36 +83,34 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
 
-def checked_against(data: Sequence[str], *, has_cycle: bool = True) -> str:
-    """Parts of a bus model that the published figures of data files test, and those that were never measured."""
-    tested = parts_tested(data)
+def checked_against(tested: Tested, *, has_cycle: bool = True) -> str:
+    """Parts of a bus model that published figures test, and those that were never measured."""
     parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
     never = f"never measured: {', '.join(tested.untested)}" if tested.untested and has_cycle else ""
     return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
-def never_measured(data: Sequence[str]) -> str:
-    """Parts of a bus model that no figure of the data files tests; without any figure, the whole cycle."""
-    tested = parts_tested(data)
+def never_measured(tested: Tested) -> str:
+    """Parts of a bus model that no published figure tests; without any figure, the whole cycle."""
     return ", ".join(tested.untested) or ("" if tested.parts else "a whole cycle; no figure is published")
 
 
-def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
+def reset_sentence(after: FitFigures | None) -> Iterator[Sentence]:
     """Sentence on a cycle that stops fitting at a bus reset; none for another."""
     if after is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in network.bus.safety.after_reset.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in after.safety.after_reset.items())
         text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
         yield sentence(text, state="warns")
 
 
-def margin_words(figures: FitFigures, network: Network) -> tuple[Part, ...]:
-    """Margin of a cycle under one timing model, or the limits that it breaks, without a verdict."""
+def margin_words(figures: FitFigures, broken_limits: Iterable[str]) -> tuple[Part, ...]:
+    """Margin of a cycle under one timing model, or its excess over limits, without a verdict."""
     available = attribute_value(AVAILABLE, figures)
     if figures.fits:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
         return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    reasons = [Sentence((limit.words(network),)) for limit in limits_behind(figures, network)]
+    reasons = [Sentence((words,)) for words in broken_limits]
     if TIME in figures.exceeded:
         reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
@@ -127,7 +125,7 @@ def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[Part, ...]:
     return (margin,) if doubt_us is None else (margin, " +/- ", doubt)
 
 
-def time_lines(figures: FitFigures, network: Network) -> Iterator[tuple[str, Sentence]]:
+def time_lines(figures: FitFigures, profile: Profile) -> Iterator[tuple[str, Sentence]]:
     """Labels and words on the used and the free time in the slice, under the model that decides."""
     given_us, uncertainty_us, margin_us = (
         figures.available_us,
@@ -135,11 +133,11 @@ def time_lines(figures: FitFigures, network: Network) -> Iterator[tuple[str, Sen
         figures.margin_corrected_us or 0.0,
     )
     used, whole = used_us(figures), known_text(given_us, None)
-    whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
+    whole = whole if profile.cycle.slice_ratio == 1 else f"the {whole} that the bus may use"
     words = f"{known_text(used, uncertainty_us)} us of {whole}, {100 * used / given_us:.0f} %"
     yield "used", Sentence((words,))
     doubt = "" if uncertainty_us is None else f", +/- {known_text(uncertainty_us, uncertainty_us)}"
-    reserve_us = given_us * network.profile.limits.reserve
+    reserve_us = given_us * profile.limits.reserve
     reserve = f"; {known_text(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
     free = f"{known_text(abs(margin_us), uncertainty_us)} us{doubt}"
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{free}{reserve}",))
@@ -150,9 +148,9 @@ def used_us(figures: FitFigures) -> float:
     return figures.available_us - (figures.margin_corrected_us or 0.0)
 
 
-def safety_record(figures: FitFigures, network: Network) -> Record:
+def safety_record(figures: FitFigures) -> Record:
     """Whether the settings of the bus are safe, under the kind's own key; empty if it has none."""
-    safety = network.bus.safety.figure
+    safety = figures.safety.figure
     return {} if safety is None else {safety.key: figures.safe}
 
 

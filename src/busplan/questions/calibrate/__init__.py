@@ -20,7 +20,6 @@ from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, me
 from busplan.profile.sources import locate_measurements
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import FilePath, ProfileLike, checked_models, load_network, with_its_constants
-from busplan.questions.fit.network import OfNetwork
 from busplan.sections.base import TransactionKind
 from busplan.sections.cycle import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
 from busplan.sections.machine import ProfileGroup
@@ -189,11 +188,15 @@ Measurements = FilePath | bytes | Columns | Iterable[Mapping[str, Any]] | Iterab
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CalibrateAnswer(OfNetwork, Answer):
+class CalibrateAnswer(Answer):
     """Answer of `calibrate`; times are in us."""
 
-    network: Network
+    profile: Profile
     """Network that was measured."""
+    setup: tuple[str, ...]
+    """Carrier of a payload, and the settings of the bus in force, each in a few words."""
+    headings: Mapping[str, object]
+    """Figures on the settings of the bus, by key."""
     source: str
     """Name of the measurements: the file, or "measurements"."""
     nodes: ProfileGroup
@@ -353,8 +356,11 @@ def calibrate(
     )
     repetitions = Counter((sample.transaction, sample.payload_bytes) for sample in samples)
     few = {size for (_, size), number in repetitions.items() if number < REPETITIONS_TO_COMPARE}
+    set_up = network.bus.cycle(network, model=model).figures()
     return CalibrateAnswer(
-        network=network,
+        profile=network.profile,
+        setup=(network.bus.payloads(network).carrier, *network.bus.setup_words(network)),
+        headings={key: set_up[key] for key in network.bus.figures.headings},
         source=name,
         nodes=nodes,
         timing_model=model,

@@ -47,10 +47,9 @@ def time_value(value_us: float, key: str) -> ShownValue:
 
 def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Report:
     """Report of `calibrate`; `applied_to` is the profile into which the execution time was written, or None."""
-    name, network = answer.profile.name, answer.network
+    name = answer.profile.name
     payloads = [fit._asdict() for fit in answer.payloads]
     warned = [*_warnings(answer)]
-    figures = network.bus.cycle(network, model=answer.timing_model).figures()
     return Report(
         Sentence(("Execution time of ", Code(name), " from ", Code(answer.source))),
         tuple(_blocks(answer, warned)),
@@ -58,8 +57,8 @@ def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Re
             "calibrate",
             profile=name,
             **fields(answer, "source", "timing_model"),
-            nodes=network.nodes,
-            **{key: figures[key] for key in network.bus.figures.headings},
+            nodes=sum(group.nodes for group in answer.profile.node_groups),
+            **answer.headings,
             measurements=answer.measurements,
             execution=answer.section,
             **fields(answer, "uncertainty_us", "at_most_us"),
@@ -75,9 +74,8 @@ def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Re
 
 def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
     """The fit in sentences, the figures by payload, and the section for the profile."""
-    network = answer.network
     yield fit_sentence(answer)
-    where = ", ".join((network.bus.payloads(network).carrier, *network.bus.setup_words(network)))
+    where = ", ".join(answer.setup)
     yield sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
     if answer.unchecked_bytes:
         sizes = ", ".join(map(str, answer.unchecked_bytes))

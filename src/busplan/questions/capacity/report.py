@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from busplan.buses import figure
-from busplan.buses.bus import Bus
-from busplan.buses.figure import Figure
+from busplan.buses.figure import BusFigures, Figure
 from busplan.english import nouns
 from busplan.forms.blocks import (
     Block,
@@ -26,7 +25,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import period, sentence_text
 from busplan.questions.base.sentences import FigureColumn, document, fields, figure_table, safety_record, with_profile
 from busplan.questions.capacity import CapacityAnswer
-from busplan.questions.capacity.verdict import Change, Verdict, card, uncertainty_parts
+from busplan.questions.capacity.verdict import Change, Verdict, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS
 
@@ -43,7 +42,12 @@ def capacity_report(answer: CapacityAnswer) -> Report:
     return Report(
         Sentence(("Capacity of ", Code(name))),
         tuple(_blocks(answer)),
-        document("capacity", profile=name, results=results, verdicts=list(map(_verdict, answer.verdicts))),
+        document(
+            "capacity",
+            profile=name,
+            results=results,
+            verdicts=[_verdict(answer, verdict) for verdict in answer.verdicts],
+        ),
         with_profile(name, records),
     )
 
@@ -51,7 +55,7 @@ def capacity_report(answer: CapacityAnswer) -> Report:
 def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(answer.verdicts, start=1):
-        yield card(verdict, is_brief=number < len(answer.verdicts))
+        yield verdict.card if number == len(answer.verdicts) else verdict.brief_card
     rests_on = [_rests_on_table(answer.verdicts[-1])] if answer.verdicts[-1].rests_on else []
     yield Detail((*rests_on, _table(answer), *([_groups_table(answer)] if answer.profile.group else [])))
 
@@ -66,16 +70,14 @@ _VERDICT: Final = (figure.VERDICT, figure.FITS, *_CERTAINTY, *_GROUP_BY_DECIDING
 
 def _table(answer: CapacityAnswer) -> Table:
     """Figures of all periods, the timing models side by side."""
-    network = answer.verdicts[0].network
-    profile, bus = network.profile, network.bus
-    setup = ", ".join(bus.setup_words(network))
-    counts = bus.counted(network)
+    first = answer.verdicts[0]
+    setup, counts = ", ".join(first.setup), first.counted
     caption = sentence(
         f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup and f'; {setup}'}",
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
-    rows = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)]
-    if not profile.has_cycle:
+    rows = [row for row in _rows(first.deciding.bus_figures) if not (answer.profile.group and row[0].key in COUNTS)]
+    if not answer.profile.has_cycle:
         results = [figures.values() for figures in answer.results]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
     return figure_table(
@@ -86,7 +88,7 @@ def _table(answer: CapacityAnswer) -> Table:
     )
 
 
-def _rows(bus: Bus) -> list[tuple[Figure, int]]:
+def _rows(register: BusFigures) -> list[tuple[Figure, int]]:
     """The verdict's figures, the cycle and its terms, the slice, what the kind of bus adds, and what would fit.
 
     Terms are of level 1.
@@ -94,15 +96,15 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     above = (*_VERDICT, figure.SAFE_MIN_PERIOD, figure.AVAILABLE, figure.REQUIRED)
     below = (
         *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
-        *bus.figures.table,
+        *register.table,
         *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
     )
-    return [*((row, 0) for row in above), *((term, 1) for term in bus.figures.terms), *((row, 0) for row in below)]
+    return [*((row, 0) for row in above), *((term, 1) for term in register.terms), *((row, 0) for row in below)]
 
 
 def _columns(answer: CapacityAnswer) -> Iterator[FigureColumn]:
     """A column for each period and timing model, the model that decides first."""
-    deciding = answer.verdicts[0].network.bus.deciding_model
+    deciding = answer.verdicts[0].deciding.timing_model
     for results in answer.periods:
         several = len(answer.periods) > 1
         group = period(results[0].period_us) if several else ""
@@ -162,10 +164,8 @@ def _change_record(change: Change) -> Record:
     }
 
 
-def _verdict(verdict: Verdict) -> Record:
-    change, figures, bus = verdict.change, verdict.deciding, verdict.network.bus
-    missing = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
-    summary = card(verdict).whole
+def _verdict(answer: CapacityAnswer, verdict: Verdict) -> Record:
+    change, figures, summary = verdict.change, verdict.deciding, verdict.card.whole
     lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
     return {
@@ -174,13 +174,13 @@ def _verdict(verdict: Verdict) -> Record:
         "missed_limits": [*dict.fromkeys(missed.key for missed in verdict.missed_limits)],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
-        **safety_record(figures, verdict.network),
+        **safety_record(figures),
         **fields(figures, "available_us", "required_us", "margin_us"),
         **fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
         "uncertainty_parts": uncertainty_parts(figures),
-        "reserve": verdict.network.profile.limits.reserve,
+        "reserve": answer.profile.limits.reserve,
         "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],
-        "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
+        "not_applicable": {model: list(keys) for model, keys in verdict.not_applicable.items()},
         "cheapest_change": change and _change_record(change),
         "fastest_period_us": verdict.fastest and verdict.fastest.us,
         "faster_with": verdict.best_register

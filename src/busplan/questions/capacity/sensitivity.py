@@ -11,7 +11,7 @@ from busplan.buses.limits import Perturbation
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import FITS, TIME, certainty
-from busplan.questions.fit.figures import FitFigures, figures, limits_behind, safe_nodes
+from busplan.questions.fit.figures import FitFigures, figures, safe_nodes
 from busplan.questions.fit.network import at_once, changed, trial, with_payloads
 from busplan.sections.base import TRANSACTION_KINDS, value_at
 from busplan.sections.machine import ProfileGroup
@@ -293,15 +293,12 @@ def _broken_at(network_at: Callable[[float], Network], value: float, *, whole: b
     then = figures(network, model=network.bus.deciding_model)
     if then.verdict == FITS:
         return () if then.safe else (network.bus.safety.setting,)
-    return tuple(limit.key for limit in limits_behind(then, network)) or (TIME,)
+    return then.behind or (TIME,)
 
 
 class Sensitivity(NamedTuple):
     """Effects of small changes on the margin at one period, by the timing model that decides."""
 
-    network: Network
-    """At that period."""
-    timing_model: str
     now: FitFigures
     effects: tuple[Effect, ...]
     """The largest first; changes that cannot be made come last."""
@@ -323,7 +320,7 @@ def sensitivity_of(network: Network) -> Sensitivity:
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     is_well = now.verdict == FITS and now.safe
     far = tuple(reaches(network)) if is_well else ()
-    return Sensitivity(network, network.bus.deciding_model, now, tuple(effects), next_bottleneck(network), far)
+    return Sensitivity(now, tuple(effects), next_bottleneck(network), far)
 
 
 def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
@@ -340,7 +337,7 @@ def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
     """Say how much nearer a change comes to each limit that is a time; the distance is from its value plus U."""
     for limit in network.bus.limits:
-        if limit.doubt is None:
+        if not limit.has_doubt:
             continue
         left_us, then_us = (limit.most(of) - limit.shown.value(of) for of in (network, changed))
         if then_us < left_us and left_us > 0:

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Final
 
-from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
-from busplan.buses.network import Network
+from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, BusFigures, by_key, unit_of
+from busplan.buses.limits import Safety
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
@@ -31,7 +31,7 @@ from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.report import capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Reach, Sensitivity
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.figures import FitFigures, limits_behind
+from busplan.questions.fit.figures import FitFigures
 
 _DECIMALS: Final = 3
 _CHANGE_DIGITS: Final = 4
@@ -41,18 +41,18 @@ _CHANGE_DIGITS: Final = 4
 def sensitivity_report(answer: CapacityAnswer) -> Report:
     """Report of `capacity --sensitivity`."""
     report, sensitivities = capacity_report(answer), answer.sensitivities
-    effects = [[_record(effect, at.network) for effect in at.effects] for at in sensitivities]
+    effects = [[_record(effect, at.now.safety) for effect in at.effects] for at in sensitivities]
     verdicts = [
         {
             **verdict,
             "sensitivity": records,
             "reach": [reach._asdict() for reach in at.reaches],
-            "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.network),
+            "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.now.bus_figures),
         }
         for verdict, records, at in zip(report.document["verdicts"], effects, sensitivities, strict=True)
     ]
     rows = [
-        {"period_us": at.network.profile.cycle.period_us, "timing_model": at.timing_model, **record}
+        {**fields(at.now, "period_us", "timing_model"), **record}
         for at, records in zip(sensitivities, effects, strict=True)
         for record in records
     ]
@@ -63,8 +63,8 @@ def sensitivity_report(answer: CapacityAnswer) -> Report:
     )
 
 
-def _record(effect: Effect, network: Network) -> Record:
-    then, safe = effect.then, network.bus.safety.figure
+def _record(effect: Effect, safety: Safety) -> Record:
+    then, safe = effect.then, safety.figure
     return {
         "change": effect.change,
         "key": effect.key,
@@ -77,7 +77,7 @@ def _record(effect: Effect, network: Network) -> Record:
     }
 
 
-def _bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
+def _bottleneck_record(bottleneck: NextBottleneck, register: BusFigures) -> Record:
     """What binds now and next, as data and as a sentence; with groups, their limits are a list."""
     limits = [
         {
@@ -100,7 +100,7 @@ def _bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
         "next_binding_term_us": bottleneck.next_binding_term.us,
         "next_margin_corrected_us": bottleneck.next_margin_corrected_us,
         **counts,
-        "text": sentence_text(_bottleneck_sentence(bottleneck, network)),
+        "text": sentence_text(_bottleneck_sentence(bottleneck, register)),
     }
 
 
@@ -115,7 +115,7 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     yield _headline(sensitivity)
     if notes := tuple(Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note):
         yield Detail(notes, "why some changes do nothing here")
-    yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.network)
+    yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.now.bus_figures)
     if sensitivity.reaches:
         yield _reaches_table(sensitivity.reaches)
 
@@ -123,9 +123,9 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
 def _table(sensitivity: Sensitivity) -> Table:
     """Every change with what it does to the margin, the largest effect first."""
     caption = sentence(
-        f"What moves the margin of {{}} at {{}}, by the {sensitivity.timing_model} model",
+        f"What moves the margin of {{}} at {{}}, by the {sensitivity.now.timing_model} model",
         margin_parts(sensitivity.now)[0],
-        period_value(sensitivity.network.profile.cycle.period_us),
+        period_value(sensitivity.now.period_us),
     )
     columns = (
         TableColumn("what changes", kind="words"),
@@ -141,7 +141,7 @@ def _table(sensitivity: Sensitivity) -> Table:
                 _step(effect),
                 _change_value(effect, sensitivity),
                 _then_value(effect),
-                _verdict(effect.then, sensitivity.network),
+                _verdict(effect.then),
             ),
             is_detail=bool(effect.note),
         )
@@ -197,14 +197,14 @@ def _step(effect: Effect) -> Cell:
     return sentence("{} -> {}", before, after)
 
 
-def _verdict(then: FitFigures | None, network: Network) -> Cell:
+def _verdict(then: FitFigures | None) -> Cell:
     """The verdict with the broken limits, or with the setting that is unsafe."""
     if then is None:
         return figure_value(VERDICT, None)
-    why = [limit.key for limit in limits_behind(then, network)]
+    why = list(then.behind)
     is_well = then.verdict == FITS and then.safe
     if not why and then.verdict == FITS and not then.safe:
-        why = [f"unsafe {network.bus.safety.setting}"]
+        why = [f"unsafe {then.safety.setting}"]
     shown = figure_value(VERDICT, then.verdict)
     return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if is_well else "fails")
 
@@ -258,15 +258,15 @@ def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
     if lost:
         yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {sensitivity.network.bus.safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
+        yield Sentence((f"Its {sensitivity.now.safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
 
-def _bottleneck_sentence(bottleneck: NextBottleneck, network: Network) -> Sentence:
+def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> Sentence:
     """Say what binds once the largest term, or the limit of the nodes, is gone."""
     now, next_term = bottleneck.binding_term, bottleneck.next_binding_term
-    labels = by_key(network.bus.figures.terms)
+    labels = by_key(register.terms)
     label, next_label = labels[now.key].label, labels[next_term.key].label
     us = ShownValue(now.us, "binding_term_us", "us", known_decimals(now.us, None))
     next_us = ShownValue(next_term.us, "next_binding_term_us", "us", known_decimals(next_term.us, None))

@@ -1,12 +1,14 @@
 """The verdict on one period, and its card: the lines that sum it up in every form of output."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
 from typing import Final, TypeAlias
 
+from busplan.buses.bus import Bus
 from busplan.buses.cycle import RestsOn
 from busplan.buses.network import Network
+from busplan.buses.published import Tested, parts_tested
 from busplan.buses.rule import contradicts
 from busplan.elementwise import FIT_ROUNDING
 from busplan.english import listed, nouns, plural
@@ -31,11 +33,11 @@ from busplan.questions.fit.figures import (
     after_reset,
     capacity_figures,
     figures,
-    limits_behind,
+    words_behind,
 )
 from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits, smallest_period
-from busplan.questions.fit.network import changed
+from busplan.questions.fit.network import changed, not_applicable
 from busplan.sections.base import MAX_COUNT
 
 
@@ -52,11 +54,13 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """Verdict on one period, by the timing model that decides."""
+class Judged:
+    """What is known of a network at one period, by the timing model that decides."""
 
-    network: Network
-    """The network at its period."""
+    setup: tuple[str, ...]
+    """Settings of the bus in force, each in a few words."""
+    counted: tuple[tuple[int, str], ...]
+    """How large the network is: each number with its noun."""
     period_us: float
     """None for a network without a cycle."""
     deciding: CapacityFigures
@@ -77,8 +81,8 @@ class Verdict:
     """Assumptions with a large share of the required time or of its variance."""
     rests_on: tuple[RestsOn, ...]
     """What the profile does not give and the verdict takes for granted, what matters most first."""
-    bus_lines: tuple[tuple[str, str], ...]
-    """Lines of the card that only this kind of bus has: label and words."""
+    not_applicable: Mapping[str, tuple[str, ...]]
+    """Keys in the profile that a timing model has no term for, by the names of those models."""
     warnings: tuple[str, ...]
     """Warnings that hold whatever the verdict."""
     change: Change | None
@@ -101,6 +105,16 @@ class Verdict:
     def has_room(self) -> bool:
         """Whether more nodes of some group are shown to fit."""
         return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
+
+
+@dataclass(frozen=True)
+class Verdict(Judged):
+    """Verdict on one period, by the timing model that decides."""
+
+    card: Card
+    """Subject, verdict and the lines that sum it up."""
+    brief_card: Card
+    """The same without the lines that are alike for every period."""
 
 
 Fastest: TypeAlias = tuple[SmallestPeriod | None, SettingForPeriod | None]
@@ -128,23 +142,26 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastes
     missed = missed_limits(network)
     change, no_change = _change(network, deciding, is_missed=bool(missed))
     least, best = fastest or _fastest_of(network)
-    return Verdict(
-        network=network,
+    judged = Judged(
+        setup=bus.setup_words(network),
+        counted=bus.counted(network),
         period_us=period_us,
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
-        broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
+        broken_limits=words_behind(deciding, network),
         missed_limits=missed,
         fastest=least,
         best_register=best,
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
         rests_on=cycle.rests_on(),
-        bus_lines=cycle.card_lines(is_shown_to_fit),
+        not_applicable=not_applicable(network),
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,
         no_change=no_change,
     )
+    card, brief_card = _cards(judged, network, bus_lines=cycle.card_lines(is_shown_to_fit))
+    return Verdict(**vars(judged), card=card, brief_card=brief_card)
 
 
 def _fastest_of(network: Network) -> Fastest:
@@ -180,44 +197,39 @@ _CARD_WORDS: Final = 62
 _Line = tuple[str, Sentence]
 
 
-def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
+def _cards(verdict: Judged, network: Network, *, bus_lines: Iterable[tuple[str, str]]) -> tuple[Card, Card]:
     """Sum up the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
 
-    Parameters
-    ----------
-    verdict
-        The verdict on one period.
-    is_brief
-        Whether lines that are the same for every period are left out.
+    The second card is without the lines that are alike for every period.
     """
-    network, bus = verdict.network, verdict.network.bus
-    counts = [plural(number, noun) for number, noun in bus.counted(network)]
+    counts = [plural(number, noun) for number, noun in verdict.counted]
     if network.groups:
         counts.append(period(verdict.period_us))
-    subject = Sentence((Code(network.profile.name), f"  {bus.title_of(network)}, {', '.join(counts)}"))
-    lines = [
+    title = network.bus.title_of(network)
+    subject = Sentence((Code(network.profile.name), f"  {title}, {', '.join(counts)}"))
+    first = (
         *_reasons(verdict),
-        *(_times(verdict) if network.groups else ()),
-        *((label, Sentence((words,))) for label, words in verdict.bus_lines),
-        *_room(verdict),
-        *_buses(verdict),
-    ]
-    if not is_brief:
-        lines += _basis(verdict)
-    lines += _caveats(verdict)
-    details = () if is_brief else tuple(_details(verdict))
-    return Card(subject, _word(verdict), _gauge(verdict), tuple(lines), details)
+        *(_times(verdict, network) if network.groups else ()),
+        *((label, Sentence((words,))) for label, words in bus_lines),
+        *_room(verdict, network),
+        *_buses(verdict, network.bus),
+    )
+    last = tuple(_caveats(verdict))
+    brief = Card(subject, _word(verdict), _gauge(verdict, network), (*first, *last))
+    tested = parts_tested(network.bus.evidence_for(network))
+    basis, details = tuple(_basis(verdict, network, tested)), tuple(_details(verdict, network, tested))
+    return brief._replace(lines=(*first, *basis, *last), details=details), brief
 
 
-def _word(verdict: Verdict) -> Words:
+def _word(verdict: Judged) -> Words:
     word = verdict.deciding.verdict
     but = "" if verdict.all_well or word != FITS else ", BUT"
     state: State = "passes" if verdict.all_well else "fails" if word == DOES_NOT_FIT or but else "warns"
     return Words(f"{(word or '').upper()}{but}", state)
 
 
-def _gauge(verdict: Verdict) -> Gauge | None:
-    figures, network = verdict.deciding, verdict.network
+def _gauge(verdict: Judged, network: Network) -> Gauge | None:
+    figures = verdict.deciding
     state: State = "passes" if figures.verdict == FITS else "fails"
     if network.groups:
         available_us, whole_us = figures.available_us, max(figures.period_us, used_us(figures))
@@ -236,53 +248,53 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 
 
-def _reasons(verdict: Verdict) -> Iterator[_Line]:
+def _reasons(verdict: Judged) -> Iterator[_Line]:
     """Reasons other than time why the machine does not run as the profile has it."""
     for words in verdict.broken_limits:
         yield "limit", Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
     if not verdict.deciding.safe:
-        yield "unsafe", Sentence((verdict.network.bus.safety.setting,), "fails")
+        yield "unsafe", Sentence((verdict.deciding.safety.setting,), "fails")
     if verdict.deciding.verdict == FITS:
         # Of several groups with too little room, the first.
         first = {missed.key: missed.words for missed in reversed(verdict.missed_limits)}
         yield from (("[limits]", Sentence((words,), "fails")) for words in reversed(first.values()))
 
 
-def _times(verdict: Verdict) -> Iterator[_Line]:
-    yield from time_lines(verdict.deciding, verdict.network)
-    yield "fastest period", _fastest(verdict)
+def _times(verdict: Judged, network: Network) -> Iterator[_Line]:
+    yield from time_lines(verdict.deciding, network.profile)
+    yield "fastest period", _fastest(verdict, network.bus)
 
 
-def _fastest(verdict: Verdict) -> Sentence:
+def _fastest(verdict: Judged, bus: Bus) -> Sentence:
     fastest, best = verdict.fastest, verdict.best_register
     with_best = ""
     if best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in best.changes.items())
-        with_best = f"; {_rounded_up(verdict, best.period_us)} with {values}"
+        with_best = f"; {_rounded_up(verdict, best.period_us, bus)} with {values}"
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
         none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
         return Sentence((f"none{with_best}" if best else none,), "fails")
     key = fastest.need.key
-    limited = "" if key == TIME else f", limited by {_limit_label(verdict, key)}"
-    return Sentence((f"{_rounded_up(verdict, fastest.us)}{limited}{with_best}",))
+    limited = "" if key == TIME else f", limited by {_limit_label(bus, key)}"
+    return Sentence((f"{_rounded_up(verdict, fastest.us, bus)}{limited}{with_best}",))
 
 
-def _limit_label(verdict: Verdict, key: str | None) -> str:
+def _limit_label(bus: Bus, key: str | None) -> str:
     """A limit in words: its label, or its key."""
-    limit = verdict.network.bus.limit(key) if key else None
+    limit = bus.limit(key) if key else None
     return (limit and limit.label) or str(key)
 
 
-def _rounded_up(verdict: Verdict, us: float) -> str:
+def _rounded_up(verdict: Judged, us: float, bus: Bus) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
-    if not verdict.network.bus.periods.us:
+    if not bus.periods.us:
         scale = 10.0 ** known_decimals(us, verdict.deciding.uncertainty_us)
         us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
     return period(us)
 
 
-def _room(verdict: Verdict) -> Iterator[_Line]:
+def _room(verdict: Judged, network: Network) -> Iterator[_Line]:
     """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     if verdict.all_well and verdict.has_room:
@@ -290,7 +302,7 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
         rooms = [_more(count, number) for count, number in spare if number > 0]
         yield "room for", Sentence((listed(rooms, "or"),))
         return
-    if verdict.all_well and verdict.network.groups:
+    if verdict.all_well and network.groups:
         yield "room for", Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
@@ -299,7 +311,7 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
             why = verdict.no_change if rest is None else rest
             yield label, Sentence((f"none: {why}" if why else "none",))
         return
-    meanings = change_meanings(verdict.network.bus)
+    meanings = change_meanings(network.bus)
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     left_us = change.figures.margin_corrected_us
     left = "" if left_us is None else f", which leaves {known_text(left_us, change.figures.uncertainty_us)} us"
@@ -317,7 +329,7 @@ def _more(count: GroupCapacity, number: int) -> str:
     return f"{number:,} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
 
 
-def _beside_limit(verdict: Verdict, why: str) -> str | None:
+def _beside_limit(verdict: Judged, why: str) -> str | None:
     """What a reason says beside the words of a limit that stand on the card already; None where it has other words."""
     for words in verdict.broken_limits:
         if why.startswith(words):
@@ -337,24 +349,24 @@ def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
     return text
 
 
-def _buses(verdict: Verdict) -> Iterator[_Line]:
+def _buses(verdict: Judged, bus: Bus) -> Iterator[_Line]:
     """How many such buses would carry all nodes, where one is not shown to."""
     figures = verdict.deciding
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
         yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
     elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
-        limit = _limit_label(verdict, figures.safe_limited_by)
+        limit = _limit_label(bus, figures.safe_limited_by)
         yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
 
 
-def _basis(verdict: Verdict) -> Iterator[_Line]:
+def _basis(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Line]:
     """The largest part and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
-    figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
+    figures = verdict.deciding
     if figures.terms:
         largest = max(figures.terms, key=lambda term: term.us)
         us = known_text(largest.us, figures.uncertainty_us)
-        yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
+        yield "largest part", Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
         part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
@@ -366,26 +378,25 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
     if verdict.rests_on:
         yield "rests on", Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
-    if network.groups and (never := never_measured(bus.evidence_for(network))):
+    if network.groups and (never := never_measured(tested)):
         yield "never measured", Sentence((never,))
 
 
-def _details(verdict: Verdict) -> Iterator[_Line]:
+def _details(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Line]:
     """What the answer needs only when somebody asks: the correction, the published figures, other models."""
-    figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
+    figures = verdict.deciding
     if figures.bias_us:
         words = "in what is used: measured buses take so much longer than the timing model"
         yield "correction", Sentence((f"{known_text(figures.bias_us, None)} us {words}",))
     elif network.groups and figures.bias_us is None:
-        (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
+        (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
         yield "correction", Sentence((f"none: {error}",))
-    yield "checked against", Sentence((checked_against(bus.evidence_for(network), has_cycle=False),))
-    for model in bus.timing_models:
-        if missing := bus.cannot_express(network, model=model.name):
-            yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
+    yield "checked against", Sentence((checked_against(tested, has_cycle=False),))
+    for model, missing in verdict.not_applicable.items():
+        yield f"{model} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
 
 
-def _caveats(verdict: Verdict) -> Iterator[_Line]:
+def _caveats(verdict: Judged) -> Iterator[_Line]:
     """What speaks against the verdict at its period: another model, a bus reset, a warning."""
     deciding = verdict.deciding
     for other in verdict.others:
@@ -396,7 +407,7 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
             )
             yield f"{other.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in verdict.network.bus.safety.after_reset.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in verdict.after_reset.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
     yield from (("beware", Sentence((warning,), "warns")) for warning in verdict.warnings)
 

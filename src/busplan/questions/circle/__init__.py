@@ -1,7 +1,7 @@
 """`busplan.circle_test`: is a circle still round at this period? Figures and answer; roundness.py runs the test."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.buses.figure import by_key, read_figures
@@ -23,6 +23,7 @@ from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.questions.circle.failures import Failure
+    from busplan.questions.circle.shape import Shape
     from busplan.servo.circle import CircleRun
 
 NEGLIGIBLE_MM: Final = 1e-4
@@ -169,6 +170,8 @@ class CircleTestAnswer(Answer):
     """Simulation of each period."""
     with_contributions: bool = False
     """Whether document and report rank the error sources."""
+    shapes: "tuple[Shape | None, ...]" = ()
+    """Contour error of each simulation, by angle and over time, condensed for drawings; empty where none is drawn."""
 
     @property
     def passed(self) -> bool | None:
@@ -265,10 +268,12 @@ def circle_test(
     (48656,)
     """
     from busplan.questions.circle.roundness import run_circles
+    from busplan.questions.circle.shape import Shape
 
-    return run_circles(
+    test = run_circles(
         load_network(profile),
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         with_contributions=contributions,
         progress=progress,
     )
+    return replace(test, shapes=tuple(None if run is None else Shape.of(run) for run in test.runs))

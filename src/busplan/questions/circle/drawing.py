@@ -1,11 +1,10 @@
 """The circle with its error magnified, as in ballbar reports, its error over time, and the ranked error sources."""
 
 from collections.abc import Sequence
-from math import ceil, floor
+from math import floor
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from busplan.forms.charts import (
     Curve,
@@ -26,9 +25,9 @@ from busplan.forms.lines import Tone
 from busplan.forms.numbers import ROUNDING_UM, decimals_of, period
 from busplan.forms.scale import ring_step
 from busplan.questions.circle import CircleFigures, CircleTestAnswer
+from busplan.questions.circle.shape import ContourProfile, ErrorPart, Floats, Shape
 from busplan.sections.machine import ToleranceSection
 from busplan.servo.circle import CircleRun
-from busplan.servo.contour import blocks, contour_error
 from busplan.servo.path import Direction
 
 _ERROR_SHARE: Final = 0.25
@@ -39,40 +38,6 @@ _FLAT: Final = 0.1
 """Smallest spread of the errors, as a share of the largest, drawn with zero; less would look like one line."""
 _NANOMETRES_BELOW_UM: Final = 0.1
 TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
-
-
-CONTOUR_SECTORS: Final = 720
-"""Sectors of the drawn circle: half a degree each, narrower than a printed line."""
-
-
-class ContourProfile(NamedTuple):
-    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in one without points."""
-
-    low_mm: tuple[float | None, ...]
-    high_mm: tuple[float | None, ...]
-
-    @property
-    def largest_mm(self) -> float:
-        """Largest contour error, without its sign [mm]."""
-        return max((abs(error) for error in (*self.low_mm, *self.high_mm) if error is not None), default=0.0)
-
-
-def contour_profile(run: CircleRun) -> ContourProfile:
-    """Contour error of the measured part of a circle test, by sectors counter-clockwise from the positive x axis."""
-    low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
-    for block in blocks(run.measured):
-        x_mm, y_mm = run.x_mm[block], run.y_mm[block]
-        error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
-        turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
-        sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
-        # Neighbouring points are mostly in the same sector, so each run of them is reduced to its extremes first.
-        entered = np.flatnonzero(np.diff(sector, prepend=-1))
-        np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
-        np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
-    return ContourProfile(
-        tuple(float(value) if np.isfinite(value) else None for value in low),
-        tuple(float(value) if np.isfinite(value) else None for value in high),
-    )
 
 
 class LengthUnit(NamedTuple):
@@ -197,27 +162,12 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
     return Dial(path, low, high, tuple(rings), (scale.ring_text, "a ring"), direction == "cw")
 
 
-Floats = NDArray[np.float64]
-_MAX_POINTS: Final = 1000
-"""Points of the whole move's curve, smallest and largest of each pixel or so. More would not be visible."""
-_LEAST_POINTS: Final = 50
-"""Points of a part of the move, however short."""
-
-
-class _Part(NamedTuple):
-    """A part of the move with the points of its error curve, reduced to their extremes if they are many."""
-
-    time_s: Floats
-    error_um: Floats
-    measured: bool
-
-
 class _Row(NamedTuple):
     """One simulated period."""
 
     result: CircleFigures
     run: CircleRun
-    parts: tuple[_Part, ...]
+    shape: Shape
 
 
 class _Scales(NamedTuple):
@@ -233,11 +183,11 @@ class _Scales(NamedTuple):
 def _common_scales(rows: Sequence[_Row], tolerance: ToleranceSection) -> _Scales:
     """Scales of all rows. A row whose table left the circle counts only if there is no other."""
     shown = [row for row in rows if not row.run.diverged] or rows
-    measured = [part.error_um for row in shown for part in row.parts if part.measured]
+    measured = [part.error_um for row in shown for part in row.shape.parts if part.measured]
     # Mean and largest error of a trapezoid are those of the whole move.
     judged = measured
     if rows[0].result.path == "trapezoid":
-        judged = [part.error_um for row in shown for part in row.parts]
+        judged = [part.error_um for row in shown for part in row.shape.parts]
     radius_um = rows[0].result.radius_mm * 1e3
     low_um, high_um = (float(np.clip(end, -radius_um, radius_um)) for end in _ends(judged))
     largest_mm = min(max(map(abs, _ends(measured))), radius_um) / 1e3
@@ -253,40 +203,6 @@ def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
     return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
 
 
-def _parts(run: CircleRun) -> tuple[_Part, ...]:
-    """Parts before, in and after the measured turn or arc; neighbours share a point."""
-    error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
-    start, stop = run.measured.start, min(run.measured.stop, run.steps)
-    ranges = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))
-    parts = []
-    for first, end, measured in ranges:
-        most = max(_LEAST_POINTS, _MAX_POINTS * (end - first) // run.steps)
-        kept = first + extremes(error_um[first:end], most=most)
-        time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
-        parts.append(_Part(time_s, error_um[kept], measured))
-    return tuple(parts)
-
-
-def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
-    """Indices of points that keep the outline of a curve: smallest and largest of each stretch, first and last.
-
-    They are about `most` points, ascending; a shorter curve keeps all.
-
-    Examples
-    --------
-    >>> extremes(np.array([0.0, 1.0, 9.0, 2.0, 3.0, -7.0, 4.0, 5.0]), most=4).tolist()
-    [0, 2, 5, 7]
-    >>> len(extremes(np.linspace(0.0, 1.0, 199), most=20))
-    20
-    """
-    if len(values) <= most:
-        return np.arange(len(values))
-    width = ceil(2 * len(values) / most)
-    firsts = range(0, len(values), width)
-    kept = [first + pick(values[first : first + width]) for first in firsts for pick in (np.argmin, np.argmax)]
-    return np.unique([0, *kept, len(values) - 1])
-
-
 _ROOM: Final = 0.08
 """Empty room above and below the errors, as a share of their range [1]."""
 _TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: "neutral"}
@@ -295,8 +211,8 @@ _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 def circle_drawing(test: CircleTestAnswer) -> Drawing:
     """Drawing of each simulated period, at least one, on the same scales, one below the other."""
-    pairs = zip(test.results, test.runs, strict=True)
-    rows = [_Row(result, run, _parts(run)) for result, run in pairs if run is not None]
+    simulated = zip(test.results, test.runs, test.shapes, strict=True)
+    rows = [_Row(result, run, shape) for result, run, shape in simulated if run is not None and shape is not None]
     scales = _common_scales(rows, test.profile.tolerance)
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
@@ -318,8 +234,8 @@ def _circle(row: _Row, scales: _Scales) -> Panel:
     whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
     words = f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}"
     plot = None
-    if scale is not None and not row.run.diverged:
-        plot = dial(contour_profile(row.run), scale, row.run.path.direction)
+    if scale is not None and row.shape.contour is not None:
+        plot = dial(row.shape.contour, scale, row.run.path.direction)
     return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
 
 
@@ -351,13 +267,13 @@ def _errors(row: _Row, scales: _Scales) -> Panel:
     guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
     limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
     guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
-    curves = tuple(_curve(part, up, row, per_um=per_um) for part in row.parts)
-    during = (Shade(Entry("during"), *part.time_s[[0, -1]].tolist()) for part in row.parts if part.measured)
-    across = numbers("time [s]", 0.0, float(row.parts[-1].time_s[-1]))
+    curves = tuple(_curve(part, up, row, per_um=per_um) for part in row.shape.parts)
+    during = (Shade(Entry("during"), *part.time_s[[0, -1]].tolist()) for part in row.shape.parts if part.measured)
+    across = numbers("time [s]", 0.0, float(row.shape.parts[-1].time_s[-1]))
     return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 
 
-def _curve(part: _Part, up: Ruler, row: _Row, *, per_um: float) -> Curve:
+def _curve(part: ErrorPart, up: Ruler, row: _Row, *, per_um: float) -> Curve:
     """Error curve of a part of the move. Errors far off the scale are clipped: nothing draws huge numbers."""
     spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
     errors = np.clip(part.error_um * per_um, up.low - spread, up.high + spread)

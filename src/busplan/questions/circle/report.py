@@ -36,10 +36,10 @@ from busplan.questions.circle import (
     CircleTestAnswer,
     telling_measures,
 )
-from busplan.questions.circle.drawing import contour_profile, dial, magnified
+from busplan.questions.circle.drawing import dial, magnified
 from busplan.questions.circle.failures import MARGINS
+from busplan.questions.circle.shape import ContourProfile
 from busplan.sections.profile import Profile
-from busplan.servo.circle import CircleRun
 
 
 def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
@@ -181,10 +181,10 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
         yield from (_contributions_table(result) for result in ranked if result.contributions)
         if ranked:
             yield ACT_TOGETHER if any(result.contributions for result in ranked) else NO_SOURCES
-    for result, run in zip(test.results, test.runs, strict=True):
+    for result, shape in zip(test.results, test.shapes, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
-        if run is not None:
-            yield _circle_chart(run, result, test.profile)
+        if shape is not None:
+            yield _circle_chart(shape.contour, result, test.profile)
 
 
 def _falling(test: CircleTestAnswer) -> Iterator[Sentence]:
@@ -241,11 +241,11 @@ def _contributions_table(result: CircleFigures) -> Table:
     return Table(columns, tuple(rows), caption)
 
 
-def _circle_chart(run: CircleRun, result: CircleFigures, profile: Profile) -> Chart | Sentence:
+def _circle_chart(contour: ContourProfile | None, result: CircleFigures, profile: Profile) -> Chart | Sentence:
     """The circle with its error magnified, or the reason why it is not drawn."""
-    if run.diverged:
+    if contour is None:
         return Sentence(("Not drawn: ", *_failure_words(result).parts, "."))
-    contour, setup = contour_profile(run), _setup_values(result)
+    setup = _setup_values(result)
     tolerance_mm = profile.tolerance.max_contour_error_mm
     scale = magnified(contour.largest_mm, tolerance_mm=tolerance_mm)
     if scale is None:

@@ -1,16 +1,16 @@
 """`busplan.compare`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log2
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
-from busplan.buses.bus import Bus
 from busplan.buses.network import Network
+from busplan.buses.published import Tested, parts_tested
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Report
+from busplan.forms.blocks import Report, Sentence
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
@@ -21,14 +21,15 @@ from busplan.questions.base.arguments import (
     require_cycle,
     with_its_constants,
 )
+from busplan.questions.base.sentences import execution_sentence
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
-from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
+from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes, words_behind
 from busplan.questions.fit.graded import assumed_rates, given
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
-from busplan.questions.fit.network import OfNetwork, at_period, changed, network_of, varied_nodes
+from busplan.questions.fit.network import at_period, changed, network_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
-from busplan.sections.profile import Profile
+from busplan.sections.profile import Profile, varied_nodes
 
 _ROUND_US: Final = 1000.0
 """Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""
@@ -47,19 +48,42 @@ class SafeAxes(NamedTuple):
     """Key of the limit that keeps them from being more."""
 
 
+class NotOnKind(NamedTuple):
+    """A kind of bus that cannot have the machine."""
+
+    name: str
+    """Name of the kind, or of a variant of it."""
+    kind: str
+    title: str
+    """Name of the bus, for people."""
+    tested: Tested
+    """Parts of its model that published figures test."""
+    why: tuple[str, ...]
+
+
 class MachineOnKind(NamedTuple):
     """The machine on one kind of bus."""
 
     name: str
     """Name of the kind, or of a variant of it."""
-    network: Network
+    profile: Profile
+    title: str
+    """Name of the bus, for people."""
+    tested: Tested
+    """Parts of its model that published figures test."""
     is_own: bool
     """Whether this is the kind of the profile, where the machine stays as it is."""
     assumed: tuple[AssumedKey, ...]
+    assumed_host: tuple[AssumedKey, ...]
+    """Assumptions about the host's own time, those of the profile included; a machine with any has no rank."""
     left_out: tuple[str, ...]
     """Keys and sections that the profile sets and this kind does not have."""
+    execution: str
+    """Meaning of the profile's execution times on another kind; empty where there is nothing to say."""
     figures: FitFigures
     """Under the timing model that decides, at the profile's period."""
+    broken_limits: tuple[str, ...]
+    """By how much each limit of the bus is broken, or why it is not shown to be kept."""
     after_reset: FitFigures | None
     """Figures after a bus reset; None unless it is shown to fit now and not after the reset."""
     safe: SafeAxes
@@ -72,73 +96,46 @@ class MachineOnKind(NamedTuple):
     None on the profile's own kind."""
 
     @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
-
-    @property
-    def bus(self) -> Bus:
+    def kind(self) -> str:
         """The kind of bus."""
-        return self.network.bus
-
-    @property
-    def title(self) -> str:
-        """Name of the bus, for people."""
-        return self.bus.title_of(self.network)
+        return self.profile.bus.kind
 
     @property
     def fits(self) -> bool:
         """Whether it is shown to fit its period, on a bus that is set safely."""
         return self.figures.verdict == FITS and self.figures.safe
 
-    @property
-    def assumed_host(self) -> tuple[AssumedKey, ...]:
-        """Assumptions about the host's own time, those of the profile included; a machine with any has no rank."""
-        key = self.bus.key_of("host")
-        inputs = [given(self.profile, key)] if self.is_own and key else []
-        of_profile = (
-            AssumedKey(host.name, host.value, "profile") for host in inputs if host.grade == "assumed" and host.value
-        )
-        return (*of_profile, *(assumed for assumed in self.assumed if assumed.key == key))
-
-
-class NotOnKind(NamedTuple):
-    """A kind of bus that cannot have the machine."""
-
-    name: str
-    """Name of the kind, or of a variant of it."""
-    bus: Bus
-    title: str
-    """Name of the bus, for people."""
-    why: tuple[str, ...]
-
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CompareAnswer(OfNetwork, Answer):
+class CompareAnswer(Answer):
     """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
 
     Parameters
     ----------
-    network
-        The network of the profile.
+    profile
+        The profile.
+    nodes, axes
+        Size of its network.
+    counted
+        Name of the group whose nodes are counted for the most axes; empty where all nodes are alike.
+    execution
+        The grade of the execution times, in words.
     kinds
         The kinds in the order of the argument; of all, the profile's own first. Each has `figures` at the profile's
         period, its `smallest` period and its most `safe` axes, or the reason why it has none.
     """
 
-    network: Network
+    profile: Profile
+    nodes: int
+    axes: int
+    counted: str
+    execution: tuple[Sentence, ...]
     kinds: tuple[MachineOnKind | NotOnKind, ...]
 
     @property
     def compared(self) -> tuple[MachineOnKind, ...]:
         """The kinds that can have the machine."""
         return tuple(machine for machine in self.kinds if isinstance(machine, MachineOnKind))
-
-    @property
-    def counted(self) -> str:
-        """Name of the group whose nodes are counted for the most axes; empty where all nodes are alike."""
-        return varied_nodes(self.profile).name
 
     def on(self, kind: str) -> MachineOnKind | NotOnKind:
         """The machine on one kind of bus.
@@ -221,14 +218,22 @@ def compare(
     smallest_us = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
     periods_us = _curve_periods(network.profile.cycle.period_us, smallest_us)
     with_curves = (
-        machine
-        if isinstance(machine, NotOnKind)
-        else machine._replace(
-            curve=tuple(_most_axes(at_period(machine.network, us), machine.best) for us in periods_us)
-        )
+        machine if isinstance(machine, NotOnKind) else machine._replace(curve=tuple(_curve(machine, periods_us)))
         for machine in machines
     )
-    return CompareAnswer(network, tuple(with_curves))
+    return CompareAnswer(
+        network.profile,
+        int(network.nodes),
+        int(network.axes),
+        varied_nodes(network.profile).name,
+        tuple(execution_sentence(network)),
+        tuple(with_curves),
+    )
+
+
+def _curve(machine: MachineOnKind, periods_us: Iterable[float]) -> Iterator[SafeAxes]:
+    network = network_of(machine.profile)
+    return (_most_axes(at_period(network, us), machine.best) for us in periods_us)
 
 
 def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
@@ -236,9 +241,9 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     try:
         conversion = converted(network.profile, kind, variant=variant)
     except BusplanError as error:
-        return NotOnKind(
-            name, kind_named(kind), variant.replace("-", " ").upper() or kind_named(kind).title, error.problems
-        )
+        bus = kind_named(kind)
+        title = variant.replace("-", " ").upper() or bus.title
+        return NotOnKind(name, kind, title, parts_tested(bus.evidence_data), error.problems)
     on_kind, assumed = network_of(conversion.profile), conversion.assumed
     is_own = kind == network.bus.kind and not variant
     needed = {} if is_own else settings_to_be_carried(on_kind)
@@ -251,21 +256,47 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     best = None if is_own else best_register(on_kind, smallest)
     if best is not None:
         smallest = smallest_period(changed(on_kind, best.changes), with_limits=False)
-    rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
-    capacity = figures(on_kind, model=on_kind.bus.deciding_model)
+    if is_own:
+        assumed = tuple(AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
+    bus = on_kind.bus
+    capacity = figures(on_kind, model=bus.deciding_model)
     return MachineOnKind(
         name=name,
-        network=on_kind,
+        profile=on_kind.profile,
+        title=bus.title_of(on_kind),
+        tested=parts_tested(bus.evidence_for(on_kind)),
         is_own=is_own,
-        assumed=tuple(rates) if is_own else assumed,
+        assumed=assumed,
+        assumed_host=tuple(_assumed_host(on_kind, assumed, is_own=is_own)),
         left_out=conversion.left_out,
+        execution="" if is_own else _execution(on_kind, network),
         figures=capacity,
+        broken_limits=words_behind(capacity, on_kind),
         after_reset=after_reset(on_kind, capacity),
         safe=_most_axes(on_kind, best),
         smallest=smallest,
         curve=(),
         best=best,
     )
+
+
+def _assumed_host(network: Network, assumed: Sequence[AssumedKey], *, is_own: bool) -> Iterator[AssumedKey]:
+    """Assumptions about the host's own time, those of the profile included."""
+    key = network.bus.key_of("host")
+    if is_own and key and (host := given(network.profile, key)).grade == "assumed" and host.value:
+        yield AssumedKey(host.name, host.value, "profile")
+    yield from (assumption for assumption in assumed if assumption.key == key)
+
+
+def _execution(on_kind: Network, network: Network) -> str:
+    """Meaning of the profile's execution times on another kind; empty where there is nothing to say."""
+    is_in_profile = network.bus.has_execution(network)
+    if not on_kind.bus.has_execution(on_kind):
+        return "No execution time is in its cycle." if is_in_profile else ""
+    title = network.bus.title_of(network)
+    none = "" if is_in_profile else f"; no execution time is in the cycle of {title} as this profile sets it"
+    assumed = f"Execution times are assumed to be as long as on {title}; here they are: {on_kind.bus.starter.base}"
+    return f"{assumed}{none}."
 
 
 def _most_axes(network: Network, best: SettingForPeriod | None) -> SafeAxes:

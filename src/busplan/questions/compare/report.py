@@ -5,8 +5,6 @@ from itertools import cycle
 from typing import Final
 
 from busplan.buses.figure import SAFE_AXES, VERDICT, Ink
-from busplan.buses.network import Network
-from busplan.buses.published import parts_tested
 from busplan.english import listed, nouns, plural
 from busplan.forms.blocks import (
     Block,
@@ -34,7 +32,6 @@ from busplan.profile.edit import short_text
 from busplan.questions.base.sentences import (
     checked_against,
     document,
-    execution_sentence,
     fields,
     margin_parts,
     parts_by,
@@ -43,7 +40,6 @@ from busplan.questions.base.sentences import (
 )
 from busplan.questions.compare import CompareAnswer, MachineOnKind, NotOnKind, SafeAxes
 from busplan.questions.fit.certainty import DOES_NOT_FIT
-from busplan.questions.fit.figures import limits_behind
 
 _INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
 """Colours of the curves; each has a letter, too."""
@@ -83,8 +79,7 @@ def compare_report(answer: CompareAnswer) -> Report:
             profile=answer.profile.name,
             kind=answer.profile.bus.kind,
             period_us=answer.profile.cycle.period_us,
-            nodes=int(answer.network.nodes),
-            axes=int(answer.network.axes),
+            **fields(answer, "nodes", "axes"),
             group=answer.counted or None,
             buses=records,
         ),
@@ -105,9 +100,9 @@ def _blocks(answer: CompareAnswer) -> Iterator[Block]:
     if answer.compared:
         yield Chart(_drawing(answer, title=sentence_text(summary)), Sentence((_CAPTION,)))
     yield from filter(None, (_hindrance(machine) for machine in answer.kinds))
-    notes = (*(_note(machine, answer.network) for machine in answer.compared), *_left_out(answer))
+    notes = (*map(_note, answer.compared), *_left_out(answer))
     yield Detail(notes, "what each kind leaves out, assumes and was checked against")
-    yield from execution_sentence(answer.network)
+    yield from answer.execution
     assumed = [(machine, assumption) for machine in answer.compared for assumption in machine.assumed]
     if assumed:
         rows = (
@@ -174,7 +169,7 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
         return TableRow((machine.title, *before, Words("not compared", "warns"), *after))
     figures = machine.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
-    unsafe = f", unsafe {machine.bus.safety.setting}" if is_unsafe else ""
+    unsafe = f", unsafe {figures.safety.setting}" if is_unsafe else ""
     new = [assumed for assumed in machine.assumed if assumed.source in ("new profile", "profile")]
     defaults = len(machine.assumed) - len(new)
     count = f"{defaults} {nouns(defaults, 'default')}" if defaults else ""
@@ -185,7 +180,7 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
         machine.safe.limited_by,
         Words(f"{figures.verdict}{unsafe}", state_of(machine.fits)),
         Sentence(margin_parts(figures, unit=False)),
-        machine.bus.figures.term_label(figures.binding_term),
+        figures.bus_figures.term_label(figures.binding_term),
         ", ".join(filter(None, (_values(new), count))) or "-",
     )
     return TableRow(cells)
@@ -196,41 +191,27 @@ def _hindrance(machine: MachineOnKind | NotOnKind) -> Sentence | None:
     if isinstance(machine, NotOnKind):
         return Sentence((f"{machine.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
     figures, sentences = machine.figures, list[Sentence]()
-    broken = [limit.words(machine.network) for limit in limits_behind(figures, machine.network)]
-    if broken:
-        sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(broken)}.",)))
+    if machine.broken_limits:
+        sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(machine.broken_limits)}.",)))
     if not machine.safe.nodes:
         at = period(figures.period_us)
         sentences.append(Sentence((f"Not one node is shown to fit {at}, limited by {machine.safe.limited_by}.",)))
     if machine.smallest.us is None:
         sentences.append(Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",)))
-    sentences += reset_sentence(machine.after_reset, machine.network)
+    sentences += reset_sentence(machine.after_reset)
     return joined(Sentence((f"{machine.title}:",)), *sentences) if sentences else None
 
 
-def _note(machine: MachineOnKind, network: Network) -> Sentence:
+def _note(machine: MachineOnKind) -> Sentence:
     """Say of a kind what execution times mean on it, and what it is checked against."""
     sentences = []
-    if execution := _execution(machine, network):
-        sentences.append(Sentence((execution,)))
+    if machine.execution:
+        sentences.append(Sentence((machine.execution,)))
     if machine.best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in machine.best.changes.items())
         sentences.append(Sentence((f"The smallest period is with {values}, which is free to change.",)))
-    sentences.append(Sentence((f"Checked against {checked_against(machine.bus.evidence_for(machine.network))}.",)))
+    sentences.append(Sentence((f"Checked against {checked_against(machine.tested)}.",)))
     return joined(Sentence((f"{machine.title}:",)), *sentences)
-
-
-def _execution(machine: MachineOnKind, network: Network) -> str:
-    """Meaning of the profile's execution times on another kind; empty where there is nothing to say."""
-    is_in_profile = network.bus.has_execution(network)
-    if machine.is_own:
-        return ""
-    if not machine.bus.has_execution(machine.network):
-        return "No execution time is in its cycle." if is_in_profile else ""
-    title = network.bus.title_of(network)
-    none = "" if is_in_profile else f"; no execution time is in the cycle of {title} as this profile sets it"
-    assumed = f"Execution times are assumed to be as long as on {title}; here they are: {machine.bus.starter.base}"
-    return f"{assumed}{none}."
 
 
 def _left_out(answer: CompareAnswer) -> Iterator[Sentence]:
@@ -248,12 +229,11 @@ def _left_out(answer: CompareAnswer) -> Iterator[Sentence]:
 
 def _drawing(answer: CompareAnswer, *, title: str) -> Drawing:
     """The most axes over the period: a curve for each kind of bus, and this machine as a line across and one up."""
-    compared, own_us = answer.compared, answer.profile.cycle.period_us
-    own_axes = int(answer.network.axes)
+    compared, own_us, own_axes = answer.compared, answer.profile.cycle.period_us, answer.axes
     points = [point for machine in compared for point in machine.curve]
     periods_us, top = sorted({point.period_us for point in points}), max(point.axes or 1 for point in points)
     machine_now = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")
-    marks = letters(machine.profile.bus.kind.upper() for machine in compared)
+    marks = letters(machine.kind.upper() for machine in compared)
     plot = Curves(
         logarithmic("period, logarithmic", periods_us[0], periods_us[-1], period, at=periods_us, own=own_us),
         logarithmic("axes, logarithmic", 1, max(_LEAST_TOP, own_axes, top), lambda axes: f"{axes:.0f}"),
@@ -277,10 +257,9 @@ def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> Curve:
 
 def _record(machine: MachineOnKind | NotOnKind) -> Record:
     """A kind of bus as plain data; what a kind that cannot have the machine lacks is null."""
-    bus = machine.bus
-    tested = parts_tested(bus.evidence_data if isinstance(machine, NotOnKind) else bus.evidence_for(machine.network))
+    tested = machine.tested
     head = {
-        "kind": bus.kind,
+        "kind": machine.kind,
         "title": machine.title,
         "is_own": False,
         "why_not": [],

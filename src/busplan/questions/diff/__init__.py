@@ -19,7 +19,7 @@ from busplan.questions.base.arguments import Models, ProfileLike, argument, chec
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.needs import missed_limits
-from busplan.questions.fit.network import OfNetwork, model_names, network_of
+from busplan.questions.fit.network import model_names, network_of
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 
@@ -65,12 +65,12 @@ class ComparedFigure:
 
 
 @dataclass(frozen=True)
-class DiffSide(OfNetwork):
+class DiffSide:
     """One of the two profiles."""
 
     argument: str
     """Argument as given; the name of a `Profile`."""
-    network: Network
+    profile: Profile
     deciding: CapacityFigures
     """Figures of the timing model that decides."""
     missed_limits: tuple[str, ...]
@@ -187,7 +187,7 @@ def diff(
         side_a,
         side_b,
         tuple(_keys(side_a.profile, side_b.profile)),
-        tuple(_figures(side_a, side_b, models)),
+        tuple(_figures((side_a, network_a), (side_b, network_b), models)),
     )
 
 
@@ -215,7 +215,7 @@ def _side(name: str, network: Network) -> DiffSide:
     with constants_changed(network.profile.constants):
         deciding = capacity_figures(network, model=network.bus.deciding_model)
         missed = tuple(dict.fromkeys(missed.key for missed in missed_limits(network)))
-        return DiffSide(name, network, deciding, missed)
+        return DiffSide(name, network.profile, deciding, missed)
 
 
 def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
@@ -262,8 +262,11 @@ def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
     )
 
 
-def _figures(a: DiffSide, b: DiffSide, models: Sequence[str]) -> Iterator[ComparedFigure]:
-    buses = (a.network.bus, b.network.bus)
+def _figures(
+    side_a: tuple[DiffSide, Network], side_b: tuple[DiffSide, Network], models: Sequence[str]
+) -> Iterator[ComparedFigure]:
+    (a, network_a), (b, network_b) = side_a, side_b
+    buses = (network_a.bus, network_b.bus)
     groups = tuple(dict.fromkeys(group.name for side in (a, b) for group in side.profile.group))
     plan = (*plan_figures(*buses), *_of_groups(groups, register.SAFE_NODES))
     yield from _compared("plan", plan, a.deciding, b.deciding)
@@ -272,7 +275,7 @@ def _figures(a: DiffSide, b: DiffSide, models: Sequence[str]) -> Iterator[Compar
         yield from _compared("deciding", cycle, a.deciding, b.deciding)
         return
     for model in models:
-        yield from _compared(model, cycle, *(_of_model(side.network, model) for side in (a, b)))
+        yield from _compared(model, cycle, *(_of_model(network, model) for network in (network_a, network_b)))
 
 
 def _of_model(network: Network, model: str) -> CapacityFigures:

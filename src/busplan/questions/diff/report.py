@@ -27,7 +27,6 @@ from busplan.profile.kinds import KeyValue
 from busplan.questions.base.sentences import document, fields
 from busplan.questions.diff import ComparedFigure, DiffAnswer, DiffSide, Judgement
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
-from busplan.questions.fit.network import model_names
 
 _KEYS: Final = (
     TableColumn("key", kind="words", wraps=True),
@@ -102,7 +101,7 @@ def diff_report(answer: DiffAnswer) -> Report:
 
 def regression_words(answer: DiffAnswer, *, tolerance_percent: float) -> str:
     """Message that names the figures of B that are worse; empty without any."""
-    names = _names(answer, answer.regressions(tolerance_percent=tolerance_percent))
+    names = _names(answer.regressions(tolerance_percent=tolerance_percent))
     by = f" by more than {tolerance_percent:.12g} %" if tolerance_percent else ""
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}" if names else ""
 
@@ -122,9 +121,8 @@ def _sentence(answer: DiffAnswer) -> Sentence:
 
 def _verdict(side: DiffSide) -> str:
     word = side.verdict or ""
-    bus = side.network.bus
     buts = [
-        *([] if side.deciding.safe else [f"its {bus.safety.setting} is not safe"]),
+        *([] if side.deciding.safe else [f"its {side.deciding.safety.setting} is not safe"]),
         *([f"it misses {listed(side.missed_limits, 'and')}"] if side.missed_limits else []),
     ]
     verdict = word if word in (FITS, DOES_NOT_FIT) else f"is {word}"
@@ -132,19 +130,19 @@ def _verdict(side: DiffSide) -> str:
 
 
 def _judged(answer: DiffAnswer, judgement: Judgement) -> str:
-    names = _names(answer, answer.judged(judgement))
+    names = _names(answer.judged(judgement))
     more = len(names) - _MOST_NAMED
     shown = [*names[:_MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
     return f"{judgement} in {plural(len(names), 'figure')}: {listed(shown, 'and')}" if names else ""
 
 
-def _names(answer: DiffAnswer, figures: Sequence[ComparedFigure]) -> list[str]:
+def _names(figures: Sequence[ComparedFigure]) -> list[str]:
     """Names of figures, each once, with the timing model if only one judges it so."""
-    models = {model for side in (answer.a, answer.b) for model in model_names(side.network)}
     parts: dict[str, list[str]] = {}
     for compared in figures:
         parts.setdefault(compared.figure.label, []).append(compared.part)
-    return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
+    of_all = ["plan"], ["deciding"]
+    return [f"{label} ({of[0]})" if len(of) == 1 and of not in of_all else label for label, of in parts.items()]
 
 
 def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
@@ -166,7 +164,7 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
         or (figure.judgement == "neutral" and None not in (figure.a, figure.b))
     ]
     if differ:
-        deciding = {"plan", *(side.network.bus.deciding_model for side in (answer.a, answer.b))}
+        deciding = {"plan", *(side.deciding.timing_model for side in (answer.a, answer.b))}
         first = [figure for figure in differ if figure.judgement != "neutral" and figure.part in deciding] or differ
         rows = (_row(figure)._replace(is_detail=figure not in first) for figure in differ)
         yield Table(_FIGURES, tuple(rows), heads=3)

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from busplan.buses import kind_named
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -75,8 +74,7 @@ def _document(kinds: Sequence[KindEvidence], records: list[Record], *, paper: bo
 def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
     for kind in kinds:
         if not paper:
-            bus = kind_named(kind.kind)
-            yield Sentence((f"{bus.title} (kind {bus.kind}): checked against {checked_against(bus.evidence_data)}.",))
+            yield Sentence((f"{kind.title} (kind {kind.kind}): checked against {checked_against(kind.tested)}.",))
         chapters = tuple(
             Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
             for section in kind.sections

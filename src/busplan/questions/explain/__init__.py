@@ -7,7 +7,7 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.figure import Figure
 from busplan.english import listed, plural
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Report
+from busplan.forms.blocks import Record, Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import (
     Models,
@@ -22,7 +22,9 @@ from busplan.questions.explain.derivation import (
     CommandName,
     Derivation,
     assumptions,
+    constant_rows,
     derive,
+    equation_rows,
     explained_figures,
     figures_of,
     latency_names,
@@ -46,6 +48,10 @@ class ExplainAnswer(Answer):
     """Without a figure, the inputs on which the verdict rests, the least well known first; empty with one."""
     figures: tuple[tuple[CommandName, Figure], ...] = ()
     """Without a figure, each figure that can be explained, with its command; empty with one."""
+    equations: tuple[Record, ...] = ()
+    """Without a figure, one row for each equation: numbers, formula, function and source; empty with one."""
+    constants: tuple[Record, ...] = ()
+    """Without a figure, one row for each constant of the kind of bus: value, unit, grade and source; empty with one."""
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -53,7 +59,7 @@ class ExplainAnswer(Answer):
 
         if self.derivations:
             return explain_report(self.profile.name, self.derivations)
-        return assumptions_report(self.profile, self.assumptions, self.figures)
+        return assumptions_report(self)
 
     def _headline(self) -> str:
         if self.derivations:
@@ -117,7 +123,11 @@ def explain(
         if names:
             raise BusplanError(f"{listed(names, 'and')}: goes with a figure, as busplan explain PROFILE required_us")
         return ExplainAnswer(
-            network.profile, assumptions=assumptions(network), figures=tuple(explained_figures(network))
+            network.profile,
+            assumptions=assumptions(network),
+            figures=tuple(explained_figures(network)),
+            equations=tuple(equation_rows()),
+            constants=tuple(constant_rows(network.bus)),
         )
     if not isinstance(figure, str):
         raise BusplanError(f'figure {figure!r}: expected a key of the JSON, as "required_us"')

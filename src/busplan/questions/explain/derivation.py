@@ -16,12 +16,14 @@ from busplan.buses.network import Network
 from busplan.elementwise import Number, Traced, TracedConstant, value_of, worded
 from busplan.english import listed
 from busplan.errors import BusplanError
-from busplan.questions.explain.formula import formula_text, inputs, lines
+from busplan.forms.blocks import Record
+from busplan.questions.base.sentences import fields
+from busplan.questions.explain.formula import formula_of, formula_text, inputs, lines
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures
 from busplan.questions.fit.graded import choosing_keys, traced_network
 from busplan.questions.fit.network import model_names
-from busplan.sourced import Input, constants_looked_up, short
+from busplan.sourced import EQUATIONS, Input, constants_looked_up, short
 
 CommandName = Literal["capacity", "latency"]
 _Numbers = Mapping[str, Traced]
@@ -323,3 +325,24 @@ def assumptions(network: Network) -> tuple[Input, ...]:
         return -1 if is_time and not given.source.startswith("default") else len(GRADES)
 
     return tuple(sorted((given for given in by_name.values() if rank(given) < len(GRADES)), key=rank))
+
+
+def equation_rows() -> list[Record]:
+    """One row for each equation: numbers, formula, function and source."""
+    return [
+        {
+            "reference": equation.reference,
+            "formula": f"{equation.symbol} = {formula_of(equation)}",
+            "function": name,
+            "source": equation.source,
+        }
+        for name, equation in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
+    ]
+
+
+def constant_rows(bus: Bus) -> list[Record]:
+    """One row for each constant: value, unit, grade and source."""
+    return [
+        {"name": name, "value": float(constant), **fields(constant, "unit", "grade", "source", "meaning")}
+        for name, constant in bus.constants.items()
+    ]

@@ -4,8 +4,6 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from busplan.buses.bus import Bus
-from busplan.buses.figure import Figure
 from busplan.english import plural
 from busplan.forms.blocks import (
     Block,
@@ -26,11 +24,9 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import figure_text, period_value
 from busplan.questions.base.sentences import document, fields, with_profile
-from busplan.questions.explain.derivation import GRADES, CommandName, Derivation, Step
-from busplan.questions.explain.formula import formula_of
-from busplan.questions.fit.network import bus_of
-from busplan.sections.profile import Profile
-from busplan.sourced import DIGITS, EQUATIONS, Input, short
+from busplan.questions.explain import ExplainAnswer
+from busplan.questions.explain.derivation import GRADES, Derivation, Step
+from busplan.sourced import DIGITS, Input, short
 
 _INPUTS: Final = (
     TableColumn("name", kind="words", wraps=True),
@@ -63,10 +59,9 @@ _FIGURES: Final = (
 )
 
 
-def assumptions_report(
-    profile: Profile, assumptions: Sequence[Input], figures: Sequence[tuple[CommandName, Figure]]
-) -> Report:
+def assumptions_report(answer: ExplainAnswer) -> Report:
     """Report of `explain PROFILE`: the inputs on which the verdict rests, and the figures that can be explained."""
+    profile, assumptions, figures = answer.profile, answer.assumptions, answer.figures
     inputs = (
         TableRow((*_input_cells(given), given.meaning), is_detail=number >= _MOST_INPUTS)
         for number, given in enumerate(assumptions)
@@ -93,32 +88,11 @@ def assumptions_report(
             profile=profile.name,
             assumptions=[given._asdict() for given in assumptions],
             figures=records,
-            equations=equation_rows(),
-            constants=constant_rows(bus_of(profile)),
+            equations=list(answer.equations),
+            constants=list(answer.constants),
         ),
         records,
     )
-
-
-def equation_rows() -> list[Record]:
-    """Rows of equations: numbers, formula, function and source."""
-    return [
-        {
-            "reference": equation.reference,
-            "formula": f"{equation.symbol} = {formula_of(equation)}",
-            "function": name,
-            "source": equation.source,
-        }
-        for name, equation in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
-    ]
-
-
-def constant_rows(bus: Bus) -> list[Record]:
-    """Rows of constants: value, unit, grade and source."""
-    return [
-        {"name": name, "value": float(constant), **fields(constant, "unit", "grade", "source", "meaning")}
-        for name, constant in bus.constants.items()
-    ]
 
 
 def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:

@@ -7,9 +7,9 @@ from itertools import count
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
-from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
+from busplan.buses.figure import BusFigures
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Held, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total
@@ -43,7 +43,7 @@ class MostNodes(NamedTuple):
 
     nodes: Number
     limit: Number
-    limits: Sequence[Limit]
+    limits: Sequence[Held]
     """The limits that were tried."""
 
     @property
@@ -105,7 +105,7 @@ def most_and_safe_nodes(
 
 
 def most_nodes(
-    with_nodes: Callable[[Number], Network], limits: Sequence[Limit], *, ceiling: int = MAX_COUNT
+    with_nodes: Callable[[Number], Network], limits: Sequence[Held], *, ceiling: int = MAX_COUNT
 ) -> MostNodes:
     """Find the largest number of nodes that keeps every limit; of several limits that set it, the first is named.
 
@@ -142,7 +142,7 @@ _HALVED_EVERY: Final = 3
 """One step of a search in so many halves the range, whatever the values say."""
 
 
-def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
+def _most_within(limit: Held, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
     """The largest number of nodes that keeps one limit; every larger number breaks it.
 
     A value grows almost as the nodes do: the next number tried lies on the line between the last two.
@@ -213,6 +213,10 @@ class FitFigures:
 
     kind: str
     """The kind of bus."""
+    bus_figures: BusFigures
+    """Figures of the kind of bus."""
+    safety: Safety
+    """Setting of the bus that is safe or not."""
     timing_model: str
     period_us: float
     nodes: int
@@ -251,6 +255,12 @@ class FitFigures:
     own: Mapping[str, float | str | None]
     """Figures and terms that only this kind of bus has, by key."""
 
+    @property
+    def behind(self) -> tuple[str, ...]:
+        """Keys of the limits behind the verdict, without time: those broken, or those not shown to be kept."""
+        keys = (self.not_shown or ()) if self.verdict == NOT_SHOWN else self.exceeded
+        return tuple(key for key in keys if key != TIME)
+
     def values(self) -> dict[str, Any]:
         """All figures by the keys of their `Figure`s, whether every bus has them or only this kind."""
         return {**self.own, **vars(self)}
@@ -288,7 +298,7 @@ class CapacityFigures(FitFigures):
     def by_key(self) -> dict[str, Any]:
         """The figures of the JSON document by key, in its order."""
         values = self.values()
-        named = {figure.key: values[figure.key] for figure in kind_named(self.kind).figures.capacity}
+        named = {figure.key: values[figure.key] for figure in self.bus_figures.capacity}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
 
 
@@ -384,6 +394,8 @@ def figures(network: Network, *, model: str) -> FitFigures:
     own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
     return FitFigures(
         kind=bus.kind,
+        bus_figures=bus.figures,
+        safety=bus.safety,
         timing_model=model,
         **_plain_or_none(numbers),
         **decided,
@@ -492,7 +504,7 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     bus = network.bus
     period_us = bus.periods.shortest_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
-        if limit.period is not None and not limit.is_slow:
+        if limit.has_period and not limit.is_slow:
             kept = limit.shown if is_shown else limit.nominal
             period_us = larger(period_us, bus.periods.shortest_us(kept.shortest_period_us(network)))
     return period_us
@@ -500,8 +512,12 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
 
 def limits_behind(figures: FitFigures, network: Network) -> tuple[Limit, ...]:
     """The limits of the bus behind a verdict, without time: those broken, or those not shown to be kept."""
-    keys = (figures.not_shown or ()) if figures.verdict == NOT_SHOWN else figures.exceeded
-    return tuple(limit for limit in network.bus.limits if limit.key in keys)
+    return tuple(limit for limit in network.bus.limits if limit.key in figures.behind)
+
+
+def words_behind(figures: FitFigures, network: Network) -> tuple[str, ...]:
+    """By how much each limit behind a verdict is broken, or why it is not shown to be kept."""
+    return tuple(limit.words(network) for limit in limits_behind(figures, network))
 
 
 def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:

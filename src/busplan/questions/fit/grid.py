@@ -18,8 +18,9 @@ from busplan.questions.fit.figures import (
     most_and_safe_nodes,
     with_counts,
 )
-from busplan.questions.fit.network import changed, model_names, trial, varied_nodes
+from busplan.questions.fit.network import changed, model_names, trial
 from busplan.sections.machine import ProfileGroup
+from busplan.sections.profile import varied_nodes
 
 AXES: Final = "axes"
 """Key of a direction along the number of motion axes. It is no key of a profile: it sets the number of nodes."""

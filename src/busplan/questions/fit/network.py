@@ -16,27 +16,9 @@ from busplan.sourced import changed_constants
 PERIOD: Final = "cycle.period_us"
 
 
-class OfNetwork:
-    """What is about a network, and so about its profile."""
-
-    __slots__ = ()
-    network: Network
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
-
-
 def bus_of(profile: Profile) -> Bus:
     """The kind of bus that a profile describes."""
     return kind_named(profile.bus.kind)
-
-
-def varied_nodes(profile: Profile) -> ProfileGroup:
-    """The nodes whose number varies when axes are counted: all of them, or the group with the most axes."""
-    return max(profile.node_groups, key=lambda group: int(group.nodes * group.node.axes))
 
 
 def network_of(profile: Profile) -> Network:
@@ -168,7 +150,19 @@ def at_periods(network: Network, periods_us: Sequence[float] | None) -> list[Net
     ]
 
 
+def warnings_of(network: Network) -> tuple[str, ...]:
+    """Warnings for a network with its own number of nodes; they hold whatever the verdict."""
+    return tuple(network.bus.warnings(network, nodes=[int(network.nodes)]))
+
+
+def not_applicable(network: Network) -> dict[str, tuple[str, ...]]:
+    """Keys in the profile that a timing model has no term for, by the names of those models."""
+    bus = network.bus
+    missing = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
+    return {name: keys for name, keys in missing.items() if keys}
+
+
 def model_names(network: Network) -> tuple[str, ...]:
     """Names of the timing models that can express a network, in the order reports show them."""
-    bus = network.bus
-    return tuple(model.name for model in bus.timing_models if not bus.cannot_express(network, model=model.name))
+    without = not_applicable(network)
+    return tuple(model.name for model in network.bus.timing_models if model.name not in without)

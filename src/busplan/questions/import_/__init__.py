@@ -14,6 +14,7 @@ from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import FilePath, finite, one_or_several
 from busplan.questions.base.sentences import document
+from busplan.questions.capacity import capacity
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import PERIOD, network_of
 from busplan.questions.import_ import can, ethercat
@@ -44,10 +45,12 @@ class ImportAnswer(Answer):
     """Values of the profile."""
     remarks: tuple[str, ...]
     """Sentences on what the files contradict or leave open."""
+    card: tuple[str, ...]
+    """Lines of the card of `capacity`."""
 
     def sentences(self) -> tuple[str, ...]:
         """Contradictions and gaps of the files, the card of `capacity`, and values that stay unknown."""
-        return (*self.remarks, *self._card(), *self._unknown())
+        return (*self.remarks, *self.card, *self._unknown())
 
     def report(self) -> Report:
         """The answer in blocks: the verdict, what stays unknown, and every value with its place."""
@@ -60,7 +63,7 @@ class ImportAnswer(Answer):
             TableRow((Code(row.dotted), _shown(row.plain), row.fact.grade, row.fact.place, row.fact.note))
             for row in self.rows
         )
-        verdict = " ".join(self._card()[0].split())
+        verdict = " ".join(self.card[0].split())
         words = (Sentence((text,)) for text in (verdict, *self.remarks, *self._unknown()))
         return Report(
             sentence("{}, from files of the machine", Code(self.profile.name)),
@@ -68,11 +71,6 @@ class ImportAnswer(Answer):
             document("import", name=self.profile.name, values=records, remarks=list(self.remarks)),
             records,
         )
-
-    def _card(self) -> list[str]:
-        from busplan.questions.capacity import capacity
-
-        return str(capacity(self.profile)).partition("\n\n")[0].splitlines()
 
     def _unknown(self) -> tuple[str, ...]:
         """Values that nobody has measured or configured. Groups share a line, and messages do."""
@@ -172,7 +170,8 @@ def import_profile(
         profile = _validated(text, machine)
     if can.FULLEST in machine.bus:
         machine.remarks.append(_load_words(profile, machine.bus[can.FULLEST].value))
-    return ImportAnswer(profile, text, tuple(rows), tuple(machine.remarks))
+    card = str(capacity(profile)).partition("\n\n")[0].splitlines()
+    return ImportAnswer(profile, text, tuple(rows), tuple(machine.remarks), tuple(card))
 
 
 def _require_files(readings: Sequence[Reading], *, bus: str | None, channel: str | None, has_nodes: bool) -> None:

@@ -10,7 +10,8 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from busplan.buses.limits import Value
+from busplan.buses.figure import BusFigures
+from busplan.buses.limits import Safety, Value
 from busplan.buses.network import Network
 from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
@@ -23,9 +24,9 @@ from busplan.questions.base.arguments import ProfileLike, load_network, require_
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
-from busplan.questions.fit.figures import FitFigures, figures, limits_behind, safe_nodes, shortest_period_us
+from busplan.questions.fit.figures import FitFigures, figures, safe_nodes, shortest_period_us
 from busplan.questions.fit.grid import AXES, Setting, setting_at
-from busplan.questions.fit.network import PERIOD, OfNetwork, at_period, varied_nodes
+from busplan.questions.fit.network import PERIOD, at_period
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (
     MOST_CIRCLES_UNASKED,
@@ -34,7 +35,7 @@ from busplan.questions.sweep.circles import (
 )
 from busplan.questions.sweep.grid import require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
-from busplan.sections.profile import Profile
+from busplan.sections.profile import Profile, varied_nodes
 
 MOST_VALUES: Final = 64
 """Most values of a direction, enough for every gap count of IEEE 1394: more do not fit into 80 columns."""
@@ -111,13 +112,19 @@ class Region(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class MapAnswer(OfNetwork, Answer):
+class MapAnswer(Answer):
     """Answer of `map_`: where a design fits as two keys vary. A notebook shows it as a picture.
 
     Parameters
     ----------
-    network
-        The network of the profile itself: this design.
+    profile
+        The profile itself: this design.
+    bus_figures
+        Figures of the kind of bus.
+    safety
+        Setting of the bus that is safe or not.
+    timing_model
+        The timing model of the verdicts: the one that decides.
     x, y
         The directions; y is None where one key alone varies.
     rows
@@ -126,7 +133,10 @@ class MapAnswer(OfNetwork, Answer):
         Whether the circle test of every cell that fits was run.
     """
 
-    network: Network
+    profile: Profile
+    bus_figures: BusFigures
+    safety: Safety
+    timing_model: str
     x: Direction
     y: Direction | None
     rows: tuple[tuple[Cell | NotDrawn, ...], ...]
@@ -154,8 +164,8 @@ class MapAnswer(OfNetwork, Answer):
     @property
     def design_place(self) -> tuple[int, int] | None:
         """Row and column of the profile's own values; None if they are not on the map."""
-        x = design_value(self.x.key, self.network)
-        y = None if self.y is None else design_value(self.y.key, self.network)
+        x = design_value(self.x.key, self.profile)
+        y = None if self.y is None else design_value(self.y.key, self.profile)
         up = (None,) if self.y is None else self.y.values
         return (up.index(y), self.x.values.index(x)) if x in self.x.values and y in up else None
 
@@ -310,7 +320,8 @@ def map_of(
         )
         for row in range(1 if grid.y is None else len(grid.y.values))
     )
-    return MapAnswer(network, grid.x, grid.y, rows, circle)
+    bus = network.bus
+    return MapAnswer(network.profile, bus.figures, bus.safety, bus.deciding_model, grid.x, grid.y, rows, circle)
 
 
 def directions(network: Network, x: Along | None, y: Along | None, *, with_circle: bool) -> tuple[Direction, Direction]:
@@ -377,7 +388,7 @@ def _default_direction(key: str, network: Network) -> Direction:
         counts, node_axes = _counts(design_nodes, most), int(varied.node.axes)
         if not node_axes:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, counts)
-        other_axes = design_value(AXES, network) - design_nodes * node_axes
+        other_axes = design_value(AXES, network.profile) - design_nodes * node_axes
         return Direction(AXES, tuple(other_axes + count * node_axes for count in counts))
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     allowed = [us for us in network.bus.periods.us if least_us <= us <= most_us]
@@ -414,9 +425,11 @@ def _counts(design: int, most: int) -> tuple[int, ...]:
     return tuple(sorted({1, *even, *(ceil(nodes) for nodes in growing), last}))
 
 
-def design_value(key: str, network: Network) -> Any:
+def design_value(key: str, profile: Profile) -> Any:
     """The profile's own value along a direction; None if it has none."""
-    return int(network.axes) if key == AXES else value_at(network.profile, key)
+    if key != AXES:
+        return value_at(profile, key)
+    return sum(int(group.nodes * group.node.axes) for group in profile.node_groups)
 
 
 def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
@@ -424,8 +437,7 @@ def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
     unsafe = tuple(limit.key for limit in network.bus.limits if limit.role == "safety" and limit.is_broken(network))
     verdict: Any = fit.verdict  # there is one under the timing model that decides
     state: State = verdict
-    behind = tuple(limit.key for limit in limits_behind(fit, network))
-    limits: tuple[str, ...] = () if verdict == FITS else behind or (TIME,)
+    limits: tuple[str, ...] = () if verdict == FITS else fit.behind or (TIME,)
     # "does not fit" outranks "unsafe", which outranks "not shown to fit".
     if unsafe and verdict != DOES_NOT_FIT:
         state, limits = "unsafe", unsafe

@@ -48,10 +48,10 @@ from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.grid import AXES
-from busplan.questions.fit.network import PERIOD, varied_nodes
+from busplan.questions.fit.network import PERIOD
 from busplan.questions.map import Cell, Direction, MapAnswer, NotDrawn, Region, State
 from busplan.questions.sweep.digest import payload_sentences
-from busplan.sections.profile import Profile
+from busplan.sections.profile import Profile, varied_nodes
 
 _DIGITS: Final = 6
 
@@ -98,7 +98,7 @@ def _blocks(answer: MapAnswer) -> Iterator[Block]:
     yield headline
     yield from _remarks(answer)
     if answer.y is None:
-        if answer.network.groups:
+        if answer.profile.has_cycle:
             yield Chart(_curve(answer), Sentence((_CURVE.format(key=title_of(answer.x, answer.profile)),)))
         yield _values_table(answer)
         return
@@ -254,14 +254,14 @@ def _values_table(answer: MapAnswer) -> Table:
         TableColumn(title_of(answer.x, answer.profile), kind="words"),
         TableColumn("verdict", kind="words"),
         TableColumn("limited by", kind="words", wraps=True),
-        *((TableColumn("free", "us"), TableColumn("+/-", "us")) if answer.network.groups else ()),
+        *((TableColumn("free", "us"), TableColumn("+/-", "us")) if answer.profile.has_cycle else ()),
     )
     rows = []
     for cell in answer.cells:
         state = Words(_state_words(answer, cell.state), LOOKS[cell.state].tone)
         times = [attribute_value(figure, cell) for figure in (MARGIN_CORRECTED, UNCERTAINTY)]
         words = (value_text(answer.x, cell.x), state, _limit_words(answer, cell))
-        rows.append(TableRow((*words, *(times if answer.network.groups else ())), highlighted=cell is answer.design))
+        rows.append(TableRow((*words, *(times if answer.profile.has_cycle else ())), highlighted=cell is answer.design))
     return Table(columns, tuple(rows), heads=1)
 
 
@@ -319,7 +319,7 @@ def _verdict_words(answer: MapAnswer, cell: Cell) -> str:
 
 def _state_words(answer: MapAnswer, state: State) -> str:
     if state == "unsafe":
-        return f"unsafe {answer.network.bus.safety.setting}"
+        return f"unsafe {answer.safety.setting}"
     return f"{state}, and the circle passes" if state == FITS and answer.with_circle else state
 
 
@@ -328,7 +328,7 @@ def _limit_words(answer: MapAnswer, region: Region | Cell) -> str:
     words = " and ".join(region.reasons)
     if region.reasons != (TIME,):
         return words
-    return f"{words}, largest term {answer.network.bus.figures.term_label(region.binding_term)}"
+    return f"{words}, largest term {answer.bus_figures.term_label(region.binding_term)}"
 
 
 def title_of(direction: Direction, profile: Profile) -> str:
@@ -358,7 +358,7 @@ def map_document(answer: MapAnswer) -> JsonDocument:
     return document(
         "map",
         profile=answer.profile.name,
-        timing_model=answer.network.bus.deciding_model,
+        timing_model=answer.timing_model,
         x={"key": answer.x.key, "values": list(answer.x.values)},
         y=None if answer.y is None else {"key": answer.y.key, "values": list(answer.y.values)},
         with_circle=answer.with_circle,
@@ -371,7 +371,7 @@ def map_document(answer: MapAnswer) -> JsonDocument:
 
 def _record(answer: MapAnswer, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
-    safety = answer.network.bus.safety.figure
+    safety = answer.safety.figure
     return {
         **answer.values_at(cell),
         **fields(cell, "nodes", "axes", "state", "reasons", "binding_term", "verdict"),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 from busplan.buses.limits import Value
@@ -24,6 +25,7 @@ from busplan.questions.base.arguments import (
     whole,
     with_its_constants,
 )
+from busplan.questions.base.sentences import change_meanings
 from busplan.questions.fit.cure import (
     Changes,
     Freedom,
@@ -37,19 +39,19 @@ from busplan.questions.fit.cure import (
 )
 from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
 from busplan.questions.fit.needs import Need, most_asking
-from busplan.questions.fit.network import PERIOD, OfNetwork, changed, model_names, network_of
+from busplan.questions.fit.network import PERIOD, changed, model_names, network_of, warnings_of
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 
 
 @dataclass(frozen=True)
-class Option(OfNetwork):
+class Option:
     """A step of the search: what was changed so far, and what it gives."""
 
     title: str
     changes: dict[str, Value]
     """Keys that change in the goal, with their new values, the dearest change first."""
-    network: Network
+    profile: Profile
     """The goal with the changes."""
     deciding: CapacityFigures
     """Capacity under the timing model that decides."""
@@ -66,6 +68,8 @@ class Relaxation:
 
     relaxed: str
     """Name of the freedom."""
+    label: str
+    """The freedom in words."""
     changes: dict[str, Value]
     """Changes to make then: keys of the goal with new values."""
 
@@ -79,7 +83,7 @@ class PlanAnswer(Answer):
     profile
         The original profile.
     goal
-        The network with the wanted values.
+        The profile with the wanted values.
     wanted
         Wanted values that differ from the profile, by dotted key.
     free
@@ -92,16 +96,22 @@ class PlanAnswer(Answer):
         Further freedoms that would each make a plan possible; empty if there is a plan.
     after_reset
         Figures of the recommended option after a bus reset, where it does not fit then.
+    warnings
+        Warnings for the recommended option, or for the goal, that hold whatever the verdict.
+    meanings
+        What a change means on the machine, by key, for keys that do not say so.
     """
 
     profile: Profile
-    goal: Network
+    goal: Profile
     wanted: dict[str, Value]
     free: tuple[Freedom, ...]
     options: tuple[Option, ...]
     binding: Need | None
     relaxations: tuple[Relaxation, ...]
     after_reset: FitFigures | None
+    warnings: tuple[str, ...]
+    meanings: Mapping[str, str]
 
     @property
     def recommended(self) -> Option | None:
@@ -129,7 +139,7 @@ class PlanAnswer(Answer):
 
         changes = {key: as_whole(value) for key, value in (self.recommended_changes or {}).items()}
         written: dict[str, Any] = dict(flat(changes))
-        return sentence_text(settings(self.goal, written))
+        return sentence_text(settings(self.meanings, written)) if written else ""
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -223,28 +233,30 @@ def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> 
     kept = [*dict(flat(given))]
     levels = freed(goal, names, kept=kept)
     steps = search(goal, levels, kept=kept)
-    options = tuple(_option(goal, step, number) for number, step in enumerate(steps))
+    networks = [changed(goal, step.changes) for step in steps]
+    options = tuple(map(_option, networks, steps, count()))
     recommended = options[-1] if options[-1].recommended else None
     return PlanAnswer(
         profile=profile,
-        goal=goal,
+        goal=goal.profile,
         wanted={key: value for key, value in given.items() if _differs(profile, goal.profile, key)},
         free=levels,
         options=options,
         binding=None if recommended else stands_in_the_way(goal, steps[-1]),
         relaxations=() if recommended else tuple(_relaxations(goal, levels, kept)),
-        after_reset=None if recommended is None else after_reset(recommended.network, recommended.deciding),
+        after_reset=None if recommended is None else after_reset(networks[-1], recommended.deciding),
+        warnings=warnings_of(goal if recommended is None else networks[-1]),
+        meanings=change_meanings(goal.bus),
     )
 
 
-def _option(goal: Network, step: PlanStep, number: int) -> Option:
-    after = changed(goal, step.changes)
+def _option(after: Network, step: PlanStep, number: int) -> Option:
     model, ratio = after.bus.deciding_model, float(after.profile.cycle.slice_ratio)
     label = "as it is" if step.freedom is None else step.freedom.label
     return Option(
         title=f"+ {label}" if number > 1 else label,
         changes=dict(step.changes),
-        network=after,
+        profile=after.profile,
         deciding=capacity_figures(after, model=model),
         others=tuple(figures(after, model=other) for other in model_names(after) if other != model),
         held_by=most_asking(step.unmet, ratio=ratio).key if step.unmet else None,
@@ -261,7 +273,7 @@ def _relaxations(goal: Network, levels: Sequence[Freedom], kept: Sequence[str]) 
             more = [level for level in freedoms(goal) if level.name in {*names, freedom.name}]
             *_, last = search(goal, more, kept=still_kept)
             if not last.unmet:
-                yield Relaxation(freedom.name, dict(last.changes))
+                yield Relaxation(freedom.name, freedom.label, dict(last.changes))
 
 
 def _differs(profile: Profile, goal: Profile, key: str) -> bool:

@@ -1,9 +1,8 @@
 """Answer of `busplan plan`: its sentences, the table of its options, and its document."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
-from busplan.buses.network import Network
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
@@ -19,13 +18,11 @@ from busplan.forms.blocks import (
     TableRow,
     Words,
     attribute_value,
-    figure_value,
 )
 from busplan.forms.numbers import MISSING, period_value
 from busplan.profile.kinds import flat
 from busplan.questions.base.sentences import (
     NewValues,
-    change_meanings,
     document,
     fields,
     margin_parts,
@@ -35,8 +32,7 @@ from busplan.questions.base.sentences import (
     with_profile,
 )
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.cure import freedoms
-from busplan.questions.fit.figures import COUNTS, limits_behind
+from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.sections.base import TRANSACTION_KINDS
@@ -52,11 +48,11 @@ def plan_report(plan: PlanAnswer) -> Report:
         document(
             "plan",
             profile=plan.profile.name,
-            goal={"nodes": int(plan.goal.nodes), "axes": int(plan.goal.axes)},
+            goal=fields(plan.options[0].deciding, "nodes", "axes"),
             free=[freedom.name for freedom in plan.free],
             **fields(plan, "period_is_kept", "recommended_changes"),
             binding=None if plan.binding is None else {"constraint": plan.binding.key, "reason": plan.binding.why},
-            relaxations=[vars(relaxation) for relaxation in plan.relaxations],
+            relaxations=[fields(relaxation, "relaxed", "changes") for relaxation in plan.relaxations],
             options=records,
         ),
         with_profile(plan.profile.name, rows),
@@ -66,29 +62,25 @@ def plan_report(plan: PlanAnswer) -> Report:
 def _blocks(plan: PlanAnswer) -> Iterator[Block]:
     yield _headline(plan)
     yield from (_relaxed(plan, relaxation) for relaxation in plan.relaxations)
-    network = plan.goal if plan.recommended is None else plan.recommended.network
-    yield from warning_sentences(network)
-    yield from reset_sentence(plan.after_reset, network)
+    yield from warning_sentences(plan.warnings)
+    yield from reset_sentence(plan.after_reset)
     yield _options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
     circle = " No circle was run: a plan is of the bus alone." if plan.profile.asks_for_circle else ""
     yield Sentence((f"{mark}'Held by' is what keeps a row from fitting.{circle}",))
 
 
-def settings(network: Network, changes: NewValues) -> Sentence:
+def settings(meanings: Mapping[str, str], changes: NewValues) -> Sentence:
     """Write changes as in a profile.
 
     Examples
     --------
     >>> from busplan.forms.numbers import sentence_text
-    >>> from busplan.profile.sources import load
-    >>> from busplan.questions.fit.network import network_of
-    >>> sentence_text(settings(network_of(load("paper-4ms").profile), {"bus.nodes": 20, "bus.speed": "S400"}))
+    >>> sentence_text(settings({"bus.speed": "if all nodes can"}, {"bus.nodes": 20, "bus.speed": "S400"}))
     'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'
     """
     # The number of nodes is the goal here, so the note on a second bus does not apply.
-    meanings = {key: words for key, words in change_meanings(network.bus).items() if key != "bus.nodes"}
-    return settings_sentence(changes, meanings=meanings)
+    return settings_sentence(changes, meanings={key: words for key, words in meanings.items() if key != "bus.nodes"})
 
 
 def _headline(plan: PlanAnswer) -> Sentence:
@@ -97,12 +89,12 @@ def _headline(plan: PlanAnswer) -> Sentence:
         why = ShownValue("" if plan.binding is None else plan.binding.why, "why")
         none = Words("NO PLAN", "fails")
         return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
-    margin = (" with a margin of ", *margin_parts(option.deciding)) if plan.goal.groups else ()
+    margin = (" with a margin of ", *margin_parts(option.deciding)) if option.deciding.terms else ()
     result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
-    changes = settings(plan.goal, option.changes)
+    changes = settings(plan.meanings, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
 
@@ -115,21 +107,20 @@ def _freed(plan: PlanAnswer, before: str | None = None) -> str:
 
 def _relaxed(plan: PlanAnswer, relaxation: Relaxation) -> Sentence:
     """Say what would be enough, and what to set then."""
-    label = next(freedom.label for freedom in freedoms(plan.goal) if freedom.name == relaxation.relaxed)
-    return Sentence((f"Enough would be to free the {label}: ", *settings(plan.goal, relaxation.changes).parts, "."))
+    changes = settings(plan.meanings, relaxation.changes)
+    return Sentence((f"Enough would be to free the {relaxation.label}: ", *changes.parts, "."))
 
 
 def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
     """The goal of the plan."""
-    goal = plan.goal
-    if not goal.groups:
-        return (Code(goal.profile.name),)
-    nodes, axes = int(goal.nodes), int(goal.axes)
+    goal, figures = plan.goal, plan.options[0].deciding
+    if not figures.terms:
+        return (Code(goal.name),)
     return (
-        *(Code(goal.profile.name), " with "),
-        *(figure_value(NODES, nodes), f" {nouns(nodes, 'node')} ("),
-        *(figure_value(AXES, axes), f" {nouns(axes, 'axis')}) at "),
-        period_value(goal.profile.cycle.period_us),
+        *(Code(goal.name), " with "),
+        *(attribute_value(NODES, figures), f" {nouns(figures.nodes, 'node')} ("),
+        *(attribute_value(AXES, figures), f" {nouns(figures.axes, 'axis')}) at "),
+        period_value(goal.cycle.period_us),
     )
 
 
@@ -148,7 +139,7 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
         "held_by": option.held_by,
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
-        **{key: values[key] for key in option.network.bus.figures.planned},
+        **{key: values[key] for key in figures.bus_figures.planned},
         # Of the first nodes; a bus of messages alone has none.
         **{
             f"{kind}_bytes": next((int(group.bytes_of(kind)) for group in profile.node_groups), None)
@@ -176,7 +167,7 @@ def _row(option: Option) -> TableRow:
         option.title,
         "*" * option.recommended,
         settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
-        option.network.bus.figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
+        option.deciding.bus_figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
         *_margin(option),
         *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
@@ -190,5 +181,5 @@ def _margin(option: Option) -> tuple[ShownValue, ShownValue]:
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
     beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
-    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures, option.network))
+    is_enough = figures.verdict == FITS or (beyond_us > 0 and figures.behind)
     return margin._replace(state="neutral" if is_enough else "fails"), doubt

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Final
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, PERIOD, SAFE_AXES, UNCERTAINTY, UTILISATION, VERDICT
-from busplan.buses.network import Network
 from busplan.english import has_controls, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import (
@@ -33,7 +32,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.base.sentences import changed_report, document
 from busplan.questions.capacity import capacity
-from busplan.questions.capacity.verdict import Verdict, card
+from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.circle import circle_test
 from busplan.questions.explain import explain
 from busplan.questions.fit.circle_setup import refusals
@@ -55,7 +54,7 @@ def page_report(profiles: "Sequence[ReportedProfile]", *, title: str | None = No
     title
         Title of the page; by default the profile's name, or the number of profiles.
     """
-    usual = Code(profiles[0].network.profile.name) if len(profiles) == 1 else plural(len(profiles), "profile")
+    usual = Code(profiles[0].profile.name) if len(profiles) == 1 else plural(len(profiles), "profile")
     return Report(
         Sentence((usual if title is None else title,)),
         tuple(_blocks(profiles)),
@@ -71,7 +70,7 @@ def _document(profiles: "Sequence[ReportedProfile]") -> JsonDocument:
         "report",
         profiles=[
             {
-                "profile": reported.network.profile.name,
+                "profile": reported.profile.name,
                 "answers": {section.key: dict(section.report.document) for section in reported.sections},
                 "missing": list(reported.missing),
             }
@@ -86,15 +85,15 @@ def _blocks(profiles: "Sequence[ReportedProfile]") -> Iterator[Block]:
         return
     yield Chapter(Sentence(("Comparison",)), (_comparison(profiles),), "comparison", "comparison")
     for number, profile in enumerate(profiles, start=1):
-        yield Chapter(Sentence((Code(profile.network.profile.name),)), tuple(_chapter(profile)), key=f"p{number}")
+        yield Chapter(Sentence((Code(profile.profile.name),)), tuple(_chapter(profile)), key=f"p{number}")
 
 
 def _chapter(reported: "ReportedProfile") -> Iterator[Block]:
     """The first screen, and every answer behind a fold."""
-    description = reported.network.profile.description
+    description = reported.profile.description
     if description.strip():
         yield Sentence((" ".join(description.split()),))
-    yield card(reported.verdict)
+    yield reported.verdict.card
     yield from (Sentence((words,), "warns") for words in reported.missing)
     trade_off = reported.section("map")
     if trade_off is not None:
@@ -133,7 +132,7 @@ def _comparison(profiles: "Sequence[ReportedProfile]") -> Table:
     rows = tuple(
         TableRow(
             (
-                SectionLink(reported.network.profile.name, f"p{number}", shell_word(reported.argument)),
+                SectionLink(reported.profile.name, f"p{number}", shell_word(reported.argument)),
                 *(attribute_value(figure, reported.verdict.deciding) for figure in figures),
                 ShownValue(reported.verdict.deciding.most_axes, SAFE_AXES.key),
             )
@@ -162,16 +161,12 @@ class ReportedProfile:
     """The PROFILE argument."""
     changes: KeyChanges
     """Changes of its file by options."""
+    profile: Profile
     verdict: Verdict
     sections: tuple[PageSection, ...]
     """Its answers, that of `capacity` first."""
     missing: tuple[str, ...]
     """Why an answer is not among them that its reader expects."""
-
-    @property
-    def network(self) -> Network:
-        """The network."""
-        return self.verdict.network
 
     def section(self, key: str) -> PageSection | None:
         """The answer of a name."""
@@ -200,7 +195,7 @@ class ReportAnswer(Answer):
         return changed_report(page, changes) if all(profile.changes == changes for profile in self.profiles) else page
 
     def _headline(self) -> str:
-        return "; ".join(f"{each.network.profile.name}: {each.verdict.deciding.verdict}" for each in self.profiles)
+        return "; ".join(f"{each.profile.name}: {each.verdict.deciding.verdict}" for each in self.profiles)
 
 
 def report(
@@ -308,7 +303,7 @@ def _reported(
         )
 
     answers = tuple(sections())
-    return ReportedProfile(argument, changes, bus.verdicts[0], answers, tuple(missing))
+    return ReportedProfile(argument, changes, profile, bus.verdicts[0], answers, tuple(missing))
 
 
 def _asks_for_circle(profile: Profile, circle: bool | None) -> bool:

@@ -76,7 +76,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             raise KeyError(f"no column {name!r}; there are {', '.join(self.table)}")
         column = self.table[name]
         words = set(column.tolist()) if column.dtype == object else set()
-        figure = column_figures(self.sweep.network).get(name)
+        figure = column_figures(self.sweep).get(name)
         if (figure and "word" not in figure.sort) or all(isinstance(word, bool) for word in words):
             return column.copy()
         texts = {word: str(spelled(word)) for word in words}
@@ -131,7 +131,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             **{key: axis.size for key, axis in self.sweep.grid.axes.items()},
             TIMING_MODEL.key: len(self.sweep.timing_models),
         }
-        figures = column_figures(self.sweep.network)
+        figures = column_figures(self.sweep)
         variables = {
             name: (
                 tuple(sizes),

@@ -51,7 +51,7 @@ def default_columns(sweep: Sweep) -> tuple[str, ...]:
     A network without a cycle has what its kind adds to a table, and the limits that are broken.
     """
     if not sweep.profile.has_cycle:
-        return (*(figure.key for figure in sweep.network.bus.figures.table), EXCEEDED.key, VERDICT.key)
+        return (*(figure.key for figure in sweep.bus_figures.table), EXCEEDED.key, VERDICT.key)
     of_groups = (f"group.{group.name}.safe_nodes" for group in sweep.profile.group)
     return (*_RANKS, *of_groups, *(key for key in _OF_CIRCLES if key in sweep.columns))
 
@@ -66,11 +66,11 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
     table
         All its columns.
     """
-    points, bus = sweep.grid.points, sweep.network.bus
+    points = sweep.grid.points
     head = sentence(f"{{}}: {{}} {nouns(points, 'point')}; ", Code(sweep.profile.name), _points(points, "points"))
     fitting = (
         sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(rows[VERDICT.key] == FITS)))
-        if model == bus.deciding_model
+        if model == sweep.deciding_model
         else sentence(f"{{}} fit by the closed form of the {model} model", _points(np.sum(rows["fits"])))
         for model, rows in _by_model(sweep, table)
     )
@@ -82,10 +82,10 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
     yield from payload_sentences(sweep.profile, sweep.grid.axes)
     if sweep.group:
         yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(sweep.group))
-    safety = bus.safety.figure
+    safety = sweep.safety.figure
     unsafe = 0 if safety is None else np.sum(~first[safety.key].astype(bool))
     if unsafe and safety is not None:
-        words = f"At {{}} {nouns(int(unsafe), 'point')} the {bus.safety.setting} is unsafe ({safety.key})."
+        words = f"At {{}} {nouns(int(unsafe), 'point')} the {sweep.safety.setting} is unsafe ({safety.key})."
         yield sentence(words, _points(unsafe), state="warns")
 
 
@@ -135,7 +135,7 @@ def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[Sente
     """
     columns = (*sweep.grid.axes, TIMING_MODEL.key, *default_columns(sweep))
     total = table[TIMING_MODEL.key].size
-    figures = column_figures(sweep.network)
+    figures = column_figures(sweep)
     records = plain_rows(sweep, {name: table[name] for name in columns}, np.arange(total)[:most])
     shown, words = _points(len(records)), f"{nouns(total, 'row')}."
     return (

@@ -91,7 +91,7 @@ def _parts(sweep: Sweep, table: Columns) -> Iterator[list[list[Any]]]:
 
 def plain_columns(sweep: Sweep, table: Columns) -> list[list[Any]]:
     """Plain values of each column; None where there is none."""
-    figures = column_figures(sweep.network)
+    figures = column_figures(sweep)
     counts = {name for name, figure in figures.items() if figure.sort == "count"}
     return [_plain(values, is_count=name in counts) for name, values in table.items()]
 
@@ -128,7 +128,7 @@ def arrow_table(sweep: Sweep, table: Columns) -> "pa.Table":
 
     text = pa.dictionary(pa.int32(), pa.string())
     types = {"number": pa.float64(), "count": pa.int64(), "truth": pa.bool_(), "word": text, "words": text}
-    figures = column_figures(sweep.network)
+    figures = column_figures(sweep)
     fields, arrays = [], []
     for name, values in table.items():
         if name in sweep.grid.axes:

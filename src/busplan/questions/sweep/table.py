@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.buses.cycle import BusCycle
-from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Figure, Sort, by_key
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT
+from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, BusFigures, Figure, Sort, by_key
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Safety
 from busplan.buses.network import Network
 from busplan.elementwise import Number
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -30,11 +30,11 @@ from busplan.questions.fit.certainty import (
     verdict_code,
 )
 from busplan.questions.fit.figures import COUNTS, MostNodes, certainty_numbers, most_and_safe_nodes, numeric_figures
-from busplan.questions.fit.network import network_of, varied_nodes
+from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
 from busplan.questions.sweep.grid import Array, Columns, Grid, axis_values, checked_grid, grid_models
 from busplan.sections.base import with_all_unchecked
-from busplan.sections.profile import Profile
+from busplan.sections.profile import Profile, varied_nodes
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays fit into the processor's cache."""
@@ -45,8 +45,14 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 class Sweep(NamedTuple):
     """What a sweep computes: a row for each point of a grid and each timing model."""
 
-    network: Network
+    profile: Profile
     """The network, with its changes."""
+    bus_figures: BusFigures
+    """Figures of the kind of bus."""
+    safety: Safety
+    """Setting of the bus that is safe or not."""
+    deciding_model: str
+    """The timing model that gives the verdict."""
     grid: Grid
     """Points of the rows."""
     timing_models: tuple[str, ...]
@@ -57,15 +63,13 @@ class Sweep(NamedTuple):
     changes: KeyChanges = NO_CHANGES
 
     @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
-
-    @property
     def columns(self) -> tuple[str, ...]:
         """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
-        return (*self.grid.axes, *figure_names(self.network), *(CIRCLE_COLUMNS if self.circle else ()))
+        return (
+            *self.grid.axes,
+            *figure_names(self.profile, self.bus_figures),
+            *(CIRCLE_COLUMNS if self.circle else ()),
+        )
 
 
 def checked_sweep(
@@ -97,28 +101,28 @@ def checked_sweep(
     BusplanError
         As `axis_values`, `checked_grid`, `grid_models` and `require_few`.
     """
-    profile = network.profile
+    profile, bus = network.profile, network.bus
     axes = {key: axis_values(profile, key, given, name="vary") for key, given in vary.items()}
     grid = checked_grid(profile, axes, with_circle=circle)
     models = grid_models(network, grid, timing_models)
     varied = varied_nodes(profile).name if profile.group else ""
     if circle and not unlimited:
         require_few(grid)
-    return Sweep(network, grid, models, varied, circle, changes)
+    return Sweep(profile, bus.figures, bus.safety, bus.deciding_model, grid, models, varied, circle, changes)
 
 
-def figure_names(network: Network) -> tuple[str, ...]:
+def figure_names(profile: Profile, register: BusFigures) -> tuple[str, ...]:
     """Columns of a sweep after the varied keys; `timing_model` is the first, counts of groups are the last."""
-    groups = (f"group.{group.name}.{key}" for group in network.profile.group for key in COUNTS)
-    return (*(figure.key for figure in network.bus.figures.capacity), *groups)
+    groups = (f"group.{group.name}.{key}" for group in profile.group for key in COUNTS)
+    return (*(figure.key for figure in register.capacity), *groups)
 
 
-def column_figures(network: Network) -> dict[str, Figure]:
+def column_figures(sweep: Sweep) -> dict[str, Figure]:
     """Registered figures of a sweep's columns; a group's figure has the name of the group."""
-    figures = by_key((*CIRCLE_FIGURES, *network.bus.figures.capacity))
+    figures = by_key((*CIRCLE_FIGURES, *sweep.bus_figures.capacity))
     groups = {
         f"group.{group.name}.{key}": figures[key]._replace(label=f"{figures[key].label} of {group.name}")
-        for group in network.profile.group
+        for group in sweep.profile.group
         for key in COUNTS
     }
     return {**figures, **groups}
@@ -139,7 +143,7 @@ def figure_table(sweep: Sweep, *, progress: Progress = ignored) -> Columns:
     Paper, equations (1)-(11).
     """
     grid, profile = sweep.grid, sweep.profile
-    names = (*grid.axes, *figure_names(sweep.network))
+    names = (*grid.axes, *figure_names(profile, sweep.bus_figures))
     parts: list[Columns] = []
     done = 0
     for chunk in grid.chunks(CHUNK_POINTS):
@@ -200,7 +204,10 @@ def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
         **_counts(network, model=model, group=group),
     }
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
-    return {key: words[key] if key in words else _number(numbers[key], sorts[key]) for key in figure_names(network)}
+    return {
+        key: words[key] if key in words else _number(numbers[key], sorts[key])
+        for key in figure_names(network.profile, bus.figures)
+    }
 
 
 def _objects(words: Sequence[object]) -> Array:

@@ -4,19 +4,20 @@
 time.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from math import fsum
 from typing import Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
-from busplan.buses.limits import IDLE
+from busplan.buses.limits import IDLE, EventKind
 from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
 from busplan.elementwise import Number, existing
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import certainty, fits_in
-from busplan.questions.fit.figures import FitFigures, certainty_numbers, figures, margin_us
+from busplan.questions.fit.certainty import available_us, certainty, fits_in
+from busplan.questions.fit.figures import FitFigures, certainty_numbers, figures, margin_us, words_behind
+from busplan.questions.fit.network import model_names, warnings_of
 from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
@@ -54,34 +55,79 @@ class Event(NamedTuple):
         return self.end_us - self.start_us
 
 
+class ModelNeeds(NamedTuple):
+    """Time that the drawn cycle needs under a timing model."""
+
+    timing_model: str
+    required_us: float
+    margin_us: float
+    """What it leaves of the slice, by the timing model alone."""
+    margin_corrected_us: float | None
+    """The same less the bias, as in the verdict; None under a model that does not decide."""
+
+    @property
+    def free_us(self) -> float:
+        """What it leaves of the slice, as far as its model knows [us]."""
+        return self.margin_us if self.margin_corrected_us is None else self.margin_corrected_us
+
+
+class DistinctCycle(NamedTuple):
+    """Cycles in which the same groups are due."""
+
+    numbers: tuple[int, ...]
+    """Their numbers in the hyperperiod, from 1."""
+    groups: tuple[str, ...]
+    """Names of the groups that are due; empty where all nodes are alike."""
+    nodes: int
+    """Nodes that are due [1]."""
+    required_us: float
+    """Time that each of these cycles needs [us]."""
+
+
 class Schedule(NamedTuple):
     """A cycle, or the part of it inside a window."""
 
-    network: Network
+    profile: Profile
     figures: FitFigures
     """Closed form of the cycle that the verdict is for: time needed, time available, and whether it fits."""
+    broken_limits: tuple[str, ...]
+    """By how much each limit of the bus is broken, or why it is not shown to be kept."""
     cycle_events: tuple[Event, ...]
     """Events of the whole cycle, and the idle rest of its slice, if any."""
+    kinds: Mapping[str, EventKind]
+    """Name and colour of each kind of event, and of each sequence of events, by key."""
     from_us: float
     """Start of the window [us]."""
     to_us: float
     """End of the window [us]."""
     required_us: float
     """Closed form of the time that the cycle needs [us]."""
+    overruns: bool
+    """Whether the cycle takes more than its slice."""
+    margin_us: float
+    """Time that the cycle leaves of its slice [us]."""
     margin_corrected_us: float | None
-    """Time that the cycle leaves of its slice, less the bias; None under a model that does not decide [us]."""
+    """The same less the bias; None under a model that does not decide [us]."""
     uncertainty_us: float | None
     """Expanded uncertainty of that; None where it is unknown, too [us]."""
+    needs: tuple[ModelNeeds, ...]
+    """What the cycle needs under each timing model that applies."""
     number: int | None
     """Number of the cycle that was asked for, from 1; None for that of the verdict."""
     cycles: int
     """Hyperperiod: cycles after which the groups repeat [1]."""
-
-    @property
-    def profile(self) -> Profile:
-        """The profile of the network."""
-        profile: Profile = self.network.profile
-        return profile
+    drawn: int
+    """Number in the hyperperiod of the cycle that is laid out, from 1."""
+    due: tuple[str, ...]
+    """Names of the groups whose data are in it; an empty name where all nodes are alike."""
+    distinct: tuple[DistinctCycle, ...] | None
+    """The distinct cycles of the hyperperiod, the longest first; None for more than can be listed."""
+    setup: tuple[str, ...]
+    """Settings of the bus in force, each in a few words."""
+    path: str
+    """Which distance on the wire each node is charged with; empty where there is no choice."""
+    warnings: tuple[str, ...]
+    """Warnings that hold whatever the verdict."""
 
     @property
     def end_us(self) -> float:
@@ -93,11 +139,6 @@ class Schedule(NamedTuple):
         """End of the last event that is not idle: the required time as a sum of events [us]."""
         last = self.cycle_events[-1]
         return last.start_us if last.kind == IDLE.key else last.end_us
-
-    @property
-    def margin_us(self) -> float:
-        """Time that the cycle leaves of its slice [us]."""
-        return margin_us(self.required_us, available_us=self.figures.available_us)
 
     @property
     def is_whole(self) -> bool:
@@ -163,8 +204,9 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
-    model = network.bus.deciding_model if model is None else model
-    closed, cycle = figures(network, model=model), cycle_of(network, model, number)
+    bus, model = network.bus, network.bus.deciding_model if model is None else model
+    closed, of_verdict = figures(network, model=model), bus.cycle(network, model=model)
+    cycle, cycles = _numbered(of_verdict, number), hyperperiod(of_verdict.rates)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
         raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
@@ -172,20 +214,46 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     # A rest that is only float rounding is no idle time.
     if not fits_in(closed.available_us, available_us=end_us):
         events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
+    drawn = of_verdict.fullest if number is None else (number - 1) % cycles + 1
     return Schedule(
-        network,
+        network.profile,
         closed,
+        words_behind(closed, network),
         tuple(events),
+        kinds={kind.key: kind for kind in (*bus.stretch_kinds, IDLE, *bus.event_kinds)},
         from_us=0.0,
         to_us=events[-1].end_us,
         required_us=cycle.required_us,
-        **certainty_of(cycle, model),
+        overruns=not fits_in(cycle.required_us, available_us=closed.available_us),
+        margin_us=margin_us(cycle.required_us, available_us=closed.available_us),
+        **_certainty(cycle, model),
+        needs=tuple(
+            _needs(cycle if other == model else _numbered(bus.cycle(network, model=other), number), other)
+            for other in model_names(network)
+        ),
         number=number,
-        cycles=hyperperiod(cycle.rates),
+        cycles=cycles,
+        drawn=drawn,
+        due=tuple(member.name for group in _due_groups(of_verdict, drawn) for member in group.members),
+        distinct=_distinct_cycles(of_verdict) if cycles <= MOST_LISTED else None,
+        setup=bus.setup_words(network),
+        path=bus.path_words(network),
+        warnings=warnings_of(network),
     )
 
 
-def certainty_of(cycle: BusCycle, model: str) -> dict[str, float | None]:
+def _numbered(cycle: BusCycle, number: int | None) -> BusCycle:
+    """The cycle with a number; None for the one that the verdict is for."""
+    return cycle if number is None else cycle.at(number)
+
+
+def _needs(cycle: BusCycle, model: str) -> ModelNeeds:
+    """Time that a cycle needs under its timing model, and what it leaves of the slice."""
+    margin = margin_us(cycle.required_us, available_us=available_us(cycle.network))
+    return ModelNeeds(model, cycle.required_us, margin, _certainty(cycle, model)["margin_corrected_us"])
+
+
+def _certainty(cycle: BusCycle, model: str) -> dict[str, float | None]:
     """The corrected margin of a cycle and its uncertainty [us]; None under a model that does not decide."""
     numbers: Mapping[str, Number | None] = {}
     if model == cycle.network.bus.deciding_model:
@@ -261,56 +329,22 @@ def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
             start_us = end_us
 
 
-class DistinctCycle(NamedTuple):
-    """Cycles in which the same groups are due."""
-
-    numbers: tuple[int, ...]
-    """Their numbers in the hyperperiod, from 1."""
-    groups: tuple[str, ...]
-    """Names of the groups that are due; empty where all nodes are alike."""
-    nodes: int
-    """Nodes that are due [1]."""
-    required_us: float
-    """Time that each of these cycles needs [us]."""
-
-
-def cycle_of(network: Network, model: str, number: int | None) -> BusCycle:
-    """The cycle with a number under a timing model; None for the one that the verdict is for."""
-    cycle = network.bus.cycle(network, model=model)
-    return cycle if number is None else cycle.at(number)
-
-
-def drawn_number(laid_out: Schedule) -> int:
-    """Number in the hyperperiod of the cycle that is laid out, from 1."""
-    if laid_out.number is None:
-        return cycle_of(laid_out.network, laid_out.figures.timing_model, None).fullest
-    return (laid_out.number - 1) % laid_out.cycles + 1
-
-
-def distinct_cycles(laid_out: Schedule) -> tuple[DistinctCycle, ...] | None:
-    """The distinct cycles of the hyperperiod, the longest first; None for more than can be listed."""
-    if laid_out.cycles > MOST_LISTED:
-        return None
-    cycle = cycle_of(laid_out.network, laid_out.figures.timing_model, None)
+def _distinct_cycles(cycle: BusCycle) -> tuple[DistinctCycle, ...]:
+    """The distinct cycles of the hyperperiod, the longest first."""
     distinct = (
         DistinctCycle(
             numbers,
-            group_names(due := due_groups(laid_out, numbers[0])),
+            tuple(member.name for group in due for member in group.members if member.name),
             sum(int(group.nodes) for group in due),
             cycle.at(numbers[0]).required_us,
         )
         for numbers in numbers_by_due(cycle.rates).values()
+        for due in [_due_groups(cycle, numbers[0])]
     )
     return tuple(sorted(distinct, key=lambda each: -each.required_us))
 
 
-def due_groups(laid_out: Schedule, number: int) -> list[Group]:
+def _due_groups(cycle: BusCycle, number: int) -> list[Group]:
     """Groups whose data are in a cycle of the hyperperiod."""
-    cycle = cycle_of(laid_out.network, laid_out.figures.timing_model, None)
     pairs = zip(cycle.network.groups, cycle.rates, strict=True)
     return [group for group, rate in pairs if rate.is_due(number)]
-
-
-def group_names(groups: Sequence[Group]) -> tuple[str, ...]:
-    """Names of the profile's groups that some groups merge."""
-    return tuple(member.name for group in groups for member in group.members if member.name)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from math import ceil
-from typing import Final, NamedTuple
+from typing import Final
 
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
 from busplan.english import nouns
@@ -37,24 +37,16 @@ from busplan.questions.base.sentences import (
     time_lines,
     warning_sentences,
 )
-from busplan.questions.fit.certainty import FITS, fits_in
-from busplan.questions.fit.figures import limits_behind, margin_us
-from busplan.questions.fit.network import model_names
+from busplan.questions.fit.certainty import FITS
 from busplan.questions.timeline.events import (
     EVENTS,
     MOST_LISTED,
     SHARE,
     TOTAL,
-    DistinctCycle,
     Event,
+    ModelNeeds,
     Schedule,
     Total,
-    certainty_of,
-    cycle_of,
-    distinct_cycles,
-    drawn_number,
-    due_groups,
-    group_names,
     totals,
 )
 
@@ -73,65 +65,36 @@ _WINDOW: Final = Entry("window", "shown below", "^")
 
 def timeline_report(schedule: Schedule) -> Report:
     """Report of `timeline`: whether the cycle fits, the cycle to scale, and the total of each kind of event."""
-    needs, distinct = model_needs(schedule), distinct_cycles(schedule)
-    summary = _headline(schedule)
+    needs, summary = schedule.needs, _headline(schedule)
     return Report(
         Sentence(("Timeline of ", Code(schedule.profile.name))),
         (
             summary,
-            *warning_sentences(schedule.network),
+            *warning_sentences(schedule.warnings),
             *([_margins(needs)] if len(needs) > 1 else []),
-            *(Sentence((words,)) for words in _cycle_words(schedule, distinct)),
-            _chart(schedule, needs, title=sentence_text(summary)),
+            *(Sentence((words,)) for words in _cycle_words(schedule)),
+            _chart(schedule, title=sentence_text(summary)),
             _totals_table(schedule),
         ),
-        _document(schedule, needs, distinct),
+        _document(schedule),
         _records(schedule),
     )
 
 
-class ModelNeeds(NamedTuple):
-    """Time that the drawn cycle needs under a timing model."""
-
-    timing_model: str
-    required_us: float
-    margin_us: float
-    """What it leaves of the slice, by the timing model alone."""
-    margin_corrected_us: float | None
-    """The same less the bias, as in the verdict; None under a model that does not decide."""
-
-    @property
-    def free_us(self) -> float:
-        """What it leaves of the slice, as far as its model knows [us]."""
-        return self.margin_us if self.margin_corrected_us is None else self.margin_corrected_us
-
-
-def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
-    """Time that the drawn cycle needs under each timing model that applies."""
-    needs, available_us = [], schedule.figures.available_us
-    for model in model_names(schedule.network):
-        cycle = cycle_of(schedule.network, model, schedule.number)
-        required_us, corrected_us = cycle.required_us, certainty_of(cycle, model)["margin_corrected_us"]
-        margin = margin_us(required_us, available_us=available_us)
-        needs.append(ModelNeeds(model, required_us, margin, corrected_us))
-    return tuple(needs)
-
-
 def _headline(schedule: Schedule) -> Sentence:
     """Say the verdict as `capacity` does; under a model that does not decide, what it leaves of the slice."""
-    figures, network = schedule.figures, schedule.network
+    figures = schedule.figures
     name: tuple[Part, ...] = (Code(schedule.profile.name), " at ", period_value(figures.period_us), ": ")
     which = " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else ""
     if figures.verdict is None:
-        words = (*margin_words(figures, network), f" by the {figures.timing_model} model{which}")
+        words = (*margin_words(figures, schedule.broken_limits), f" by the {figures.timing_model} model{which}")
         return Sentence(
             (*name, *words, ", which does not affect the verdict."), state_of(figures.fits and figures.safe)
         )
     state = state_of(figures.verdict == FITS and figures.safe)
     verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
-    reasons = (limit.words(network) for limit in limits_behind(figures, network))
-    lines = (f"{label} {sentence_text(line)}" for label, line in time_lines(figures, network))
-    said = f" by the {figures.timing_model} model{which}; {'; '.join((*reasons, *lines))}."
+    lines = (f"{label} {sentence_text(line)}" for label, line in time_lines(figures, schedule.profile))
+    said = f" by the {figures.timing_model} model{which}; {'; '.join((*schedule.broken_limits, *lines))}."
     return Sentence((*name, verdict, said), state)
 
 
@@ -143,9 +106,9 @@ def _margins(needs: Sequence[ModelNeeds]) -> Sentence:
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
 
-def _cycle_words(schedule: Schedule, distinct: Sequence[DistinctCycle] | None) -> Iterator[str]:
+def _cycle_words(schedule: Schedule) -> Iterator[str]:
     """Say which cycle is drawn, and what each needs; nothing if all are alike and none was asked for."""
-    number, is_uniform = drawn_number(schedule), schedule.network.is_uniform
+    number, is_uniform = schedule.drawn, not schedule.profile.group
 
     def due_words(names: Sequence[str], due: int) -> str:
         if is_uniform:
@@ -158,38 +121,37 @@ def _cycle_words(schedule: Schedule, distinct: Sequence[DistinctCycle] | None) -
         return
     drawn = "the fullest"
     if schedule.number is not None:
-        due = due_groups(schedule, number)
-        drawn = f"cycle {number}, with {due_words(group_names(due), len(due))}"
+        drawn = f"cycle {number}, with {due_words(schedule.due, len(schedule.due))}"
         if schedule.number != number:
             yield f"Cycle {schedule.number} repeats cycle {number}."
-    if distinct is None:
+    if schedule.distinct is None:
         listed = f"More than {MOST_LISTED} cycles are not listed."
     else:
         needs = (
             f"{', '.join(map(str, cycle.numbers))}: {due_words(cycle.groups, cycle.nodes)} ({cycle.required_us:.3f} us)"
-            for cycle in distinct
+            for cycle in schedule.distinct
         )
         listed = f"Cycles {'; '.join(needs)}."
     meet = "The nodes are due" if is_uniform else "The groups meet"
     yield f"{meet} every {schedule.cycles} cycles; this is {drawn}. {listed}"
 
 
-def _chart(schedule: Schedule, needs: Sequence[ModelNeeds], *, title: str) -> Chart:
+def _chart(schedule: Schedule, *, title: str) -> Chart:
     """The whole period to scale, and below it the window or, without one, the cycle without its idle rest."""
     window = schedule._replace(to_us=schedule.used_us) if schedule.is_whole else schedule
     lanes, legend = _lanes(window)
     words = _window_words(window)
     text = sentence_text(words)
-    drawing = Drawing(title, (_period(schedule, needs), lanes), (text,), text, has_characters=True)
+    drawing = Drawing(title, (_period(schedule), lanes), (text,), text, has_characters=True)
     return Chart(drawing, words, Sentence((legend,)) if legend else None)
 
 
 def _window_words(window: Schedule) -> Sentence:
     """Say which nodes and which part of the cycle are shown, and which distance on the wire each node counts."""
-    network, nodes, cycle = window.network, window.figures.nodes, "the cycle"
+    nodes, path, cycle = window.figures.nodes, window.path, "the cycle"
     if window.number is not None and window.cycles > 1:
-        cycle = f"cycle {drawn_number(window)} of {window.cycles}"
-    setup, path = ", ".join((nouns(nodes, "node"), *network.bus.setup_words(network))), network.bus.path_words(network)
+        cycle = f"cycle {window.drawn} of {window.cycles}"
+    setup = ", ".join((nouns(nodes, "node"), *window.setup))
     return sentence(
         f"{{}} {setup}; {{}} to {{}} of {cycle}{path and f', {path}'}",
         count_value(nodes, "nodes"),
@@ -198,9 +160,9 @@ def _window_words(window: Schedule) -> Sentence:
     )
 
 
-def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
+def _period(schedule: Schedule) -> Panel:
     """The whole period, transaction by transaction, and what each timing model needs and leaves of its slice."""
-    figures, end_us = schedule.figures, schedule.end_us
+    figures, needs, end_us = schedule.figures, schedule.needs, schedule.end_us
     slice_us, period_us = figures.available_us, figures.period_us
     scale_us = max(period_us, end_us, *(slice_us - model.free_us for model in needs))
     lanes = [Lane("cycle", (*_transactions(schedule, schedule.cycle_events), *_part(_REST, end_us, period_us)))]
@@ -217,7 +179,7 @@ def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
         needed = with_unit(figure_value(REQUIRED, used_us))
         lanes.append(Lane(model.timing_model, parts, f"{needed} needed, {words}", is_thin=True))
     slice_words, title = _time(slice_us), f"The period of {_time(period_us)} us"
-    if _overruns(schedule):
+    if schedule.overruns:
         lanes.append(_over(schedule))
         title = f"{title}: its cycle of {_time(end_us)} us is beyond its slice of {slice_words} us"
     else:
@@ -262,7 +224,7 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         labels = [label.replace(" to node ", " to ") for label in labels]
         drawn = ((label, tuple(draw(window, in_lane))) for label, in_lane in zip(labels, of_lane, strict=True))
         lanes = [Lane(label, bars) for label, bars in drawn if bars]
-    if _overruns(window) and window.to_us > window.figures.available_us:
+    if window.overruns and window.to_us > window.figures.available_us:
         lanes.append(_over(window))
     plot = _plot(window, window.to_us, lanes, start_us=window.from_us, is_beside=not has_each)
     return Panel(plot, title), legend
@@ -271,22 +233,17 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
 def _plot(schedule: Schedule, end_us: float, lanes: Sequence[Lane], *, start_us: float = 0.0, **layout: bool) -> Lanes:
     """Lanes on a scale of time, with the end of the slice if the scale goes beyond it."""
     slice_us = schedule.figures.available_us
-    end = Entry("edge" if _overruns(schedule) else "limit", "end of the slice", shape="line")
+    end = Entry("edge" if schedule.overruns else "limit", "end of the slice", shape="line")
     guides = (Guide(end, x=slice_us),) if start_us < slice_us < end_us else ()
     return Lanes(numbers("us", start_us, end_us), tuple(lanes), guides, **layout)
 
 
 def _names_of_nodes(window: Schedule) -> list[str]:
     """Name of each node of the cycle: its number, or its group and its number in it."""
-    groups = window.network.profile.node_groups
+    groups = window.profile.node_groups
     names = [f"{group.name} {number}" for group in groups if group.name for number in range(1, int(group.nodes) + 1)]
     nodes = int(window.figures.nodes)
     return names if len(names) == nodes else [f"node {number}" for number in range(1, nodes + 1)]
-
-
-def _overruns(schedule: Schedule) -> bool:
-    """Whether the cycle takes more than its slice."""
-    return not fits_in(schedule.required_us, available_us=schedule.figures.available_us)
 
 
 def _over(schedule: Schedule) -> Lane:
@@ -315,13 +272,13 @@ def _transactions(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]
     for _, members in groupby(enumerate(events), owner):
         (_, first), *more = members
         kind = first.transaction or first.kind
-        label = schedule.network.bus.event_kind(kind).label
+        label = schedule.kinds[kind].label
         title = label if first.node is None else f"{kind} of node {first.node}"
         yield _bar(schedule, kind, title, first.start_us, more[-1][1].end_us if more else first.end_us)
 
 
 def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: float) -> Span:
-    look = schedule.network.bus.event_kind(kind)
+    look = schedule.kinds[kind]
     return Span(Entry(look.ink, look.label, look.mark), start_us, end_us, _tip(title, start_us, end_us))
 
 
@@ -344,7 +301,7 @@ _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
 def _totals_table(schedule: Schedule) -> Table:
     """Total time of each kind of event in the window."""
-    whole = "the cycle" if _overruns(schedule) else "the slice"
+    whole = "the cycle" if schedule.overruns else "the slice"
     part = whole if schedule.is_whole else "the window"
     return Table(
         (
@@ -357,33 +314,31 @@ def _totals_table(schedule: Schedule) -> Table:
 
 
 def _total_row(schedule: Schedule, total: Total) -> TableRow:
-    kind = schedule.network.bus.event_kind(total.kind)
+    kind = schedule.kinds[total.kind]
     values = (attribute_value(figure, total) for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
-def _document(
-    schedule: Schedule, needs: Sequence[ModelNeeds], distinct: Sequence[DistinctCycle] | None
-) -> JsonDocument:
+def _document(schedule: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
-    figures, network = schedule.figures, schedule.network
+    figures, distinct = schedule.figures, schedule.distinct
     values = figures.values()
     return document(
         "timeline",
         profile=schedule.profile.name,
         **fields(figures, "timing_model", "period_us", "nodes"),
-        **{key: values[key] for key in network.bus.figures.headings},
-        cycle=drawn_number(schedule),
+        **{key: values[key] for key in figures.bus_figures.headings},
+        cycle=schedule.drawn,
         common_multiple=schedule.cycles,
         distinct_cycles=None if distinct is None else [cycle._asdict() for cycle in distinct],
         required_us=schedule.required_us,
         available_us=figures.available_us,
         **fields(schedule, "margin_us", "margin_corrected_us", "uncertainty_us"),
         **fields(figures, "exceeded", "not_shown", "fits", "verdict"),
-        **safety_record(figures, network),
-        warnings=network.bus.warnings(network, nodes=[figures.nodes]),
+        **safety_record(figures),
+        warnings=list(schedule.warnings),
         **fields(schedule, "from_us", "to_us"),
-        margins=[model._asdict() for model in needs],
+        margins=[model._asdict() for model in schedule.needs],
         events=_event_records(schedule),
         totals=[total._asdict() for total in totals(schedule)],
     )
@@ -398,5 +353,4 @@ def _records(schedule: Schedule) -> list[Record]:
 def _event_records(schedule: Schedule) -> list[Record]:
     """One row for each event of the window."""
     keys = ("kind", "node", "transaction", "packet", "start_us", "end_us", "duration_us")
-    event_kind = schedule.network.bus.event_kind
-    return [{**fields(event, *keys), "equation": event_kind(event.kind).reference} for event in schedule.events]
+    return [{**fields(event, *keys), "equation": schedule.kinds[event.kind].reference} for event in schedule.events]
