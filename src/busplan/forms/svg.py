@@ -112,7 +112,7 @@ def _root(title: str) -> Element:
 
 
 def _markup(root: Element, *, height: float) -> str:
-    """SVG text of a drawing, escaped."""
+    """SVG of a drawing; its text is escaped."""
     root.set("height", f"{height:.0f}")
     indent(root)
     return tostring(root, encoding="unicode") + "\n"

@@ -69,7 +69,7 @@ class SentFrames(NamedTuple):
 def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
     """Mean period from the first event to the last, with its standard uncertainty [us].
 
-    The lateness of the first and the last differ by no more than the range over all events.
+    The first and the last event differ in lateness by no more than the range over all events.
     """
     number = int(periods.places[-1])
     return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)
@@ -200,7 +200,7 @@ def fullest_load(times_us: Floats, wire_us: Floats) -> float:
 
 
 def step_us(stretch: ClockStretch) -> float:
-    """Step of the stamps [us]: greatest common divisor of their distances, since logs write microseconds.
+    """Step of the stamps, which logs write in microseconds: greatest common divisor of their distances [us].
 
     One or two different distances, none of them 0, show exactly periodic frames but no step, which is then 1 us.
     """
