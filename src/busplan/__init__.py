@@ -81,8 +81,8 @@ if TYPE_CHECKING:
     from busplan.questions.timeline import TimelineAnswer, timeline
     from busplan.sections.profile import Profile
 else:
-    # Loaded at first use, because the command line imports this package, too. Hidden from type checkers, so that they
-    # report unknown names.
+    # Loaded at first use, because the command line imports this package, too. Type checkers do not see this, so that
+    # they report unknown names.
     _HOMES = {
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",

@@ -1,4 +1,4 @@
-"""The program's entry: `busplan` and `python -m busplan`."""
+"""Entry of the program: `busplan` and `python -m busplan`."""
 
 import atexit
 import gc
@@ -8,7 +8,7 @@ import os
 def main() -> None:
     """Run the command line, tuned for short runs.
 
-    Collecting garbage at exit takes a sixth of a short run: what is frozen is not searched. A pydantic plugin of
+    Collecting garbage at exit takes a sixth of a short run; frozen objects are not searched. A pydantic plugin of
     another package could change how profiles are validated. Nothing here is large enough for several threads of linear
     algebra, and starting them takes time.
     """
@@ -19,7 +19,7 @@ def main() -> None:
         from busplan.cli import run
 
         run()
-    except KeyboardInterrupt:  # before the command line can catch it
+    except KeyboardInterrupt:  # The command line could not yet catch it.
         raise SystemExit(130) from None
 
 

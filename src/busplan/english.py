@@ -1,22 +1,15 @@
-"""Words for people: counts, lists, near names, and text that is safe to print."""
+"""English words: counts, lists, near names, and text that is safe to print."""
 
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from typing import Final
 
 _MOST_NEAR = 3
-"""Most names that are asked about."""
+"""Near names in one question, at most."""
 
 
 def did_you_mean(typed: str, names: Iterable[str]) -> str:
-    """Ask whether the nearest name was meant, or the ones that begin so; empty if none is near.
-
-    Parameters
-    ----------
-    typed
-        The name as it was typed.
-    names
-        Names that there are.
+    """Question about the nearest name, or about the names that begin as typed; empty if none is near.
 
     Examples
     --------
@@ -49,20 +42,13 @@ def _escape(character: str) -> str:
 
 
 def json_escape(text: str) -> str:
-    """Write every character of a text as a JSON escape."""
+    """A text with every character as a JSON escape."""
     units = text.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
 
 
 def printable(text: str, *, write: Callable[[str], str] = _escape) -> str:
-    r"""Escape the control characters of a text; the result is one line.
-
-    Parameters
-    ----------
-    text
-        Any text.
-    write
-        Escape of a character; by default as Python does.
+    r"""A text in one line, its control characters escaped by `write`, by default as in Python.
 
     Examples
     --------
@@ -77,24 +63,14 @@ def printable(text: str, *, write: Callable[[str], str] = _escape) -> str:
 
 
 def printable_lines(text: str, *, write: Callable[[str], str] = _escape) -> str:
-    """Escape the control characters of a text, as `printable`, but keep its line ends."""
+    """A text with control characters escaped as by `printable`, but for its line ends."""
     return "\n".join(printable(line, write=write) for line in text.split("\n"))
 
 
 def json_text(value: object, *, indent: int | None = None) -> str:
-    r"""Write a value as JSON without control characters; it parses to the same value.
+    r"""A value as JSON without control characters; it parses to the same value.
 
-    Parameters
-    ----------
-    value
-        Plain data.
-    indent
-        Spaces of each level; by default, everything is on one line.
-
-    Raises
-    ------
-    ValueError
-        A number is not finite.
+    `indent` is the number of spaces of a level; None writes one line. A number that is not finite raises ValueError.
 
     Examples
     --------
@@ -103,17 +79,17 @@ def json_text(value: object, *, indent: int | None = None) -> str:
     """
     import json  # noqa: PLC0415 - most runs write none
 
-    # JSON escapes line ends inside strings; those that are left belong to the layout.
+    # JSON escapes line ends inside strings. Those that are left belong to the layout.
     return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=json_escape)
 
 
 def to_json(document: object) -> str:
-    """Write a JSON document: as `json_text`, indented, with a final newline."""
+    """A JSON document: the text of `json_text`, indented, with a final newline."""
     return json_text(document, indent=2) + "\n"
 
 
 def plural(number: int, noun: str) -> str:
-    """Write a count with its noun.
+    """A count with its noun.
 
     Examples
     --------
@@ -137,7 +113,7 @@ def nouns(number: int, noun: str) -> str:
 
 
 def listed(words: Sequence[str], last: str) -> str:
-    """Write a list in words.
+    """A list in words.
 
     Examples
     --------
@@ -149,7 +125,7 @@ def listed(words: Sequence[str], last: str) -> str:
 
 
 def first_of(words: Sequence[str], most: int, *, by: str = ", ") -> str:
-    """Write the first words of a list, and the number of the others.
+    """First words of a list, and the number of the others.
 
     Examples
     --------

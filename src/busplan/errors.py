@@ -26,36 +26,30 @@ class WorkerLostError(BusplanError):
 ProblemKind = Literal[
     "syntax", "unknown-key", "missing-key", "wrong-type", "out-of-range", "inconsistent", "execution-unknown"
 ]
-"""Kind of a problem; each has a rule of the gate."""
+"""Kinds of problems; each has a rule of the gate."""
 
 
 _MOST_SHOWN: Final = 50
 
 
 class PlacedProblem(NamedTuple):
-    """A problem at a place of a file; lines and columns count from 1."""
+    """A problem at a place in a file; lines and columns count from 1."""
 
     line: int
     column: int
     kind: ProblemKind
     message: str
     key: str = ""
-    """Dotted key; empty if the problem has none."""
+    """Dotted key of the problem; empty without one."""
     marked: tuple[int, int] | None = None
-    """First column of what is wrong, and the column after its last; None if it has no end."""
+    """First column of the mark, and the column after its last; None if it has no end."""
 
 
 class PlacedError(BusplanError):
     """An invalid file, with all its problems and their places.
 
-    Parameters
-    ----------
-    name
-        Name of the file.
-    problems
-        At least one, in the order of their places; of very many, only the first are listed.
-    hidden
-        Number of further problems that are not in `problems`.
+    Problems are at least one, in the order of their places. Of very many only the first are listed; `hidden` is the
+    number of the others.
     """
 
     def __init__(self, name: str, problems: tuple[PlacedProblem, ...], *, hidden: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""Libraries that come with an extra: whether they are there is asked before any work."""
+"""Libraries of optional extras. They are asked for before any work."""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -7,23 +7,10 @@ from busplan.errors import BusplanError
 
 
 def require_extra(library: str, *, option: str, module: str, extra: str | None = None) -> None:
-    """Refuse to start without a library.
+    """Raise BusplanError if a library is not installed, or does not load.
 
-    Parameters
-    ----------
-    library
-        Name of the library.
-    option
-        Option or method that asks for it, for messages.
-    module
-        Module of the library that is needed.
-    extra
-        The extra of busplan that it comes with; None for a library of its own.
-
-    Raises
-    ------
-    BusplanError
-        The library is not installed, or does not load.
+    `option` is the option or method that needs it, for the message; `module` is the one to import; `extra` is the extra
+    of busplan with the library, None for a library of its own.
     """
     if find_spec(library) is None:
         package = library if extra is None else f"'busplan[{extra}]'"
@@ -39,10 +26,10 @@ def require_extra(library: str, *, option: str, module: str, extra: str | None =
 
 
 def require_resvg(option: str) -> None:
-    """Refuse to start if no PNG can be made; as `require_extra`."""
+    """Raise BusplanError if no PNG can be made."""
     require_extra("resvg_py", extra="plot", option=option, module="resvg_py")
 
 
 def require_pyarrow(option: str) -> None:
-    """Refuse to start if no Parquet file can be written; as `require_extra`."""
+    """Raise BusplanError if no Parquet file can be written."""
     require_extra("pyarrow", extra="table", option=option, module="pyarrow.parquet")

@@ -1,4 +1,4 @@
-"""Files written atomically: an old file stays whole until the new file is."""
+"""Atomic writing of files: the old file stays whole until the new one is."""
 
 import io
 import os
@@ -17,28 +17,25 @@ _NEW_MODE: Final = 0o666
 
 
 def document_bytes(document: str | bytes) -> bytes:
-    """Encode a document as UTF-8; bytes of a path that are not UTF-8 become JSON escapes."""
+    """UTF-8 of a document; bytes of a path that are not UTF-8 become JSON escapes."""
     return document.encode("utf-8", "backslashreplace") if isinstance(document, str) else document
 
 
 def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
     """Write a file atomically.
 
-    Raises
-    ------
-    BusplanError
-        It exists and `overwrite` is false, or it cannot be written.
+    It raises BusplanError if the file exists and `overwrite` is false, or if it cannot be written.
     """
     with new_file(path, overwrite=overwrite) as file:
         file.write(content)
 
 
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
-"""Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
+"""Paths of pipes with a writer: in a shell, <(command) is /dev/fd/N."""
 
 
 def is_unwritten_pipe(path: Path) -> bool:
-    """Whether a file is a named pipe, and opening it may wait for a writer for ever."""
+    """Whether a file is a named pipe, which may wait for a writer for ever when it is opened."""
     return path.is_fifo() and not str(path).startswith(_OPENED)
 
 
@@ -71,15 +68,10 @@ def new_file(path: Path, *, overwrite: bool) -> Iterator["NewFile"]:
     """Open a file for atomic writing: a temporary file next to it is renamed at the end.
 
     It is opened at once, so that a path that cannot be written fails before the work. After an error, the old file is
-    unchanged.
-
-    Raises
-    ------
-    BusplanError
-        It exists and `overwrite` is false, or it cannot be written.
+    unchanged. BusplanError is raised if the file exists and `overwrite` is false, or if it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    # A name of the greatest length leaves no room for a suffix.
+    # The longest possible name leaves no room for a suffix.
     stem = target.name if len(os.fsencode(target.name)) <= _LONG_NAME else "busplan"
     temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
     with ExitStack() as last:
@@ -106,7 +98,7 @@ def new_file(path: Path, *, overwrite: bool) -> Iterator["NewFile"]:
 
 
 class _Raw(io.FileIO):
-    """A new file whose write errors name the user's path: a full disk shows in the caller's own write."""
+    """A new file whose write errors name the user's path. A full disk shows in the caller's own write."""
 
     def __init__(self, temporary: Path, *, path: Path, target: Path) -> None:
         self._names = path, target
@@ -118,7 +110,7 @@ class _Raw(io.FileIO):
 
 
 class NewFile(io.BufferedWriter):
-    """A file that is not complete yet."""
+    """A file that is not yet complete."""
 
     abandoned = False
 
@@ -140,9 +132,9 @@ def _give_name(descriptor: int, temporary: Path) -> None:
         return
     nameless = f"/proc/self/fd/{descriptor}"
     try:
-        # src_dir_fd is not used by an absolute path, but makes Python follow the link.
+        # An absolute path does not use src_dir_fd, but it makes Python follow the link.
         os.link(nameless, temporary, src_dir_fd=descriptor)
-    except OSError:  # a file system without hard links
+    except OSError:  # The file system has no hard links.
         from shutil import copyfile  # noqa: PLC0415 - loaded where it is needed
 
         copyfile(nameless, temporary)
@@ -159,12 +151,9 @@ def _remove(temporary: Path) -> None:
 
 
 def lock(descriptor: int) -> bool:
-    """Lock an open file or folder until it is closed, also by the end of the process; False if another process has it.
+    """Lock an open file or folder until it is closed or the process ends; False if another process has the lock.
 
-    Raises
-    ------
-    OSError
-        Its file system has no locks.
+    A file system without locks raises OSError.
     """
     from fcntl import LOCK_EX, LOCK_NB, flock  # noqa: PLC0415 - as above
 
@@ -177,7 +166,7 @@ def lock(descriptor: int) -> bool:
 
 @contextmanager
 def naming_errors(path: Path, target: Path) -> Iterator[None]:
-    """Convert errors of the operating system about a target to messages with the user's path."""
+    """Convert the operating system's errors about a target to messages with the user's path."""
     try:
         yield
     except FileExistsError:
@@ -190,7 +179,10 @@ def naming_errors(path: Path, target: Path) -> Iterator[None]:
 
 
 def _mode_of(target: Path, *, overwrite: bool) -> int | None:
-    """Permissions of the file to be replaced, None for a new file; refuse a file that may not be replaced."""
+    """Permissions of the file to be replaced, None for a new file.
+
+    A file that may not be replaced raises BusplanError.
+    """
     if not os.path.lexists(target):
         return None
     if not overwrite:
@@ -204,12 +196,12 @@ def _mode_of(target: Path, *, overwrite: bool) -> int | None:
 
 
 def _rename_new(temporary: Path, target: Path) -> None:
-    """Rename a file, but never over an existing file."""
+    """Rename a file, but never over an existing one."""
     try:
         os.link(temporary, target)
     except FileExistsError:
         raise
-    except OSError:  # a file system without hard links: not atomic
+    except OSError:  # Without hard links in the file system, this is not atomic.
         if os.path.lexists(target):
             raise FileExistsError from None
         temporary.replace(target)

@@ -1,4 +1,4 @@
-"""The blocks of an answer, and one module for each form that writes them."""
+"""Blocks of an answer, and one module for each form that writes them."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -11,17 +11,17 @@ Form = Literal["table", "markdown", "html", "csv", "json"]
 RowsForm = Literal["csv", "json", "parquet"]
 """Forms with every row of a sweep."""
 Picture = Literal["svg", "png"]
-"""Forms of a picture that is a file of its own. A PNG needs the extra `plot` (resvg-py)."""
+"""Forms of a picture in a file of its own. A PNG needs the extra `plot` (resvg-py)."""
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )
 ROWS_ENDINGS: Final[Mapping[str, RowsForm]] = MappingProxyType({".csv": "csv", ".json": "json", ".parquet": "parquet"})
 PICTURES: Final[Mapping[str, Picture]] = MappingProxyType({".svg": "svg", ".png": "png"})
-"""Form by file name extension."""
+"""Forms of pictures by file name extension."""
 
 
 def ending_expected(ending: str, endings: Iterable[str], *, otherwise: str = "") -> str:
-    """Say which endings a file name may have, instead of the one it has.
+    """Message on the endings that a file name may have instead of its own.
 
     Examples
     --------
@@ -36,17 +36,7 @@ def ending_expected(ending: str, endings: Iterable[str], *, otherwise: str = "")
 def render(report: "Report", form: Form) -> str:
     """Write an answer in a form, loading only the module of that form.
 
-    Parameters
-    ----------
-    report
-        The answer.
-    form
-        The form. For the colours and width of a terminal, call `terminal.text`.
-
-    Raises
-    ------
-    BusplanError
-        The answer is not available in this form.
+    For the colours and width of a terminal, call `terminal.text`. An answer without this form raises BusplanError.
     """
     match form:
         case "table":

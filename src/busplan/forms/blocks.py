@@ -1,4 +1,4 @@
-"""The blocks of an answer: sentences, tables, charts and commands, in sections.
+"""Blocks of an answer: sentences, tables, charts and commands, in sections.
 
 A block holds content, not appearance: a figure keeps its exact value, and a state is a word, not a colour. Each form
 writes every block in its own way.
@@ -12,34 +12,34 @@ from busplan.buses.figure import Figure, Ink
 from busplan.forms.charts import Drawing
 
 State = Literal["passes", "fails", "warns", "neutral"]
-"""Verdict that a piece of text carries; it sets the colour."""
+"""Verdict of a piece of text; it sets the colour."""
 JsonDocument = dict[str, Any]
 Record = dict[str, Any]
 """One row of plain data: value by column."""
 
 
 class ShownValue(NamedTuple):
-    """The exact value of one figure, and how to write it."""
+    """Exact value of a figure, and its way of writing."""
 
     value: Any
-    """Value as in the JSON document; None if there is none."""
+    """Value as in the JSON document; None without one."""
     key: str = ""
     """Key in the register of figures and in JSON; its suffix is the unit of the value."""
     unit: str = ""
-    """Unit to write the value in: "um" for a key in mm, "%" for a share."""
+    """Unit in which the value is written: "um" for a key in mm, "%" for a share."""
     decimals: int | None = None
-    """Decimals of a number; None for all it has. A number too small for them is written with three digits instead."""
+    """Decimals of a number; None for all. A number too small for them has three digits instead."""
     signed: bool = False
-    """If True, a positive number has a plus sign."""
+    """Whether a positive number has a plus sign."""
     state: State = "neutral"
     digits: int | None = None
-    """Significant digits of a number without `decimals`; None for all it has."""
+    """Significant digits of a number without `decimals`; None for all."""
     fixed: bool = False
-    """If True, always round to `decimals`: a number too small for them is written as zero."""
+    """Whether a number is always rounded to `decimals`; one too small for them is written as zero."""
     grouped: bool = False
-    """If True, commas separate the thousands of a number without `decimals`."""
+    """Whether commas separate the thousands of a number without `decimals`."""
     hexadecimal: bool = False
-    """If True, a whole number is written as 0x1f."""
+    """Whether a whole number is written as 0x1f."""
 
 
 class Words(NamedTuple):
@@ -56,13 +56,13 @@ class Code(NamedTuple):
 
 
 class SectionLink(NamedTuple):
-    """Name that links to a section."""
+    """A name that links to a section."""
 
     text: str
     key: str
     """Key of the section."""
     origin: str
-    """PROFILE argument, quoted for a shell; tells profiles of the same name apart."""
+    """PROFILE argument, quoted for a shell. It tells profiles of the same name apart."""
 
 
 class Swatch(NamedTuple):
@@ -74,7 +74,7 @@ class Swatch(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A value as a bar, on the scale of all rows of its column; the scale includes zero."""
+    """A value as a bar, on the scale of all rows of its column, which includes zero."""
 
     value: ShownValue
     least: float
@@ -108,15 +108,15 @@ class TableColumn(NamedTuple):
     unit: str = ""
     kind: Literal["words", "figures", "drawing"] = "figures"
     group: str = ""
-    """Heading above the neighbouring columns of the same group."""
+    """Heading above neighbouring columns of the same group."""
     rank: int = 0
-    """0 if the column stays in its row. On a terminal that is too narrow, the largest rank leaves first."""
+    """Order in which columns leave a table that is too wide for a terminal, the largest first; 0 for one that stays."""
     leaves: Literal["out", "below"] = "out"
-    """Where the column goes then: out of the table, or to a line below its row."""
+    """Place of the column after it has left: none, or a line below its row."""
     wraps: bool = False
-    """If True, a narrow terminal wraps the words of the column at spaces."""
+    """Whether a narrow terminal wraps the words of the column at spaces."""
     is_detail: bool = False
-    """If True, the column is shown only in a whole answer."""
+    """Whether only a whole answer shows the column."""
 
     @property
     def name(self) -> str:
@@ -129,11 +129,11 @@ class TableRow(NamedTuple):
 
     cells: tuple[Cell, ...]
     level: int = 0
-    """1 if the row is a part of the row above it, which has level 0."""
+    """Level of the row: 1 for a part of the row above it that has level 0."""
     highlighted: bool = False
-    """If True, the row is bold, to be read first."""
+    """Whether the row is bold, to be read first."""
     is_detail: bool = False
-    """If True, the row is shown only in a whole answer."""
+    """Whether only a whole answer shows the row."""
 
 
 class Table(NamedTuple):
@@ -143,9 +143,9 @@ class Table(NamedTuple):
     rows: tuple[TableRow, ...]
     caption: Sentence | None = None
     stacks: bool = False
-    """If True, a narrow screen shows each row as a list of its cells: nobody compares them down a column."""
+    """Whether a narrow screen shows each row as a list of its cells, because nobody compares them down a column."""
     heads: int = 1
-    """How many of the first columns name a row; they are repeated where a narrow terminal continues the table below."""
+    """Number of first columns that name a row. They are repeated where a narrow terminal continues the table below."""
 
 
 class Chart(NamedTuple):
@@ -154,7 +154,7 @@ class Chart(NamedTuple):
     drawing: Drawing
     caption: Sentence
     legend: Sentence | None = None
-    """How to read the SVG; follows the caption."""
+    """Advice on reading the SVG, after the caption."""
 
 
 class Snippet(NamedTuple):
@@ -164,7 +164,7 @@ class Snippet(NamedTuple):
 
 
 class CalculationStep(NamedTuple):
-    """One step of a derivation: symbol = formula = numbers = result."""
+    """A step of a derivation: symbol = formula = numbers = result."""
 
     reference: str
     symbol: str
@@ -180,20 +180,20 @@ class Calculation(NamedTuple):
 
 
 class Gauge(NamedTuple):
-    """How a period is used: shares of it, 0..1."""
+    """Use of a period, in shares of it, 0..1."""
 
     used: float
-    """Used share; more than 1 if the period does not suffice."""
+    """Used share [1]; more than 1 if the period does not suffice."""
     doubt: float
-    """Uncertainty of the used share."""
+    """Uncertainty of the used share [1]."""
     free_until: float
-    """Share at which the reserve begins."""
+    """Share at which the reserve begins [1]."""
     most: float
-    """Share that may be used, with the reserve."""
+    """Share that may be used, with the reserve [1]."""
     state: State
 
     def parts(self) -> "list[GaugePart]":
-        """Cut the period into parts, in this order: used, in doubt, free, to stay free, other use."""
+        """Parts of the period, in this order: used, in doubt, free, to stay free, other use."""
         ends = (self.used, self.used + self.doubt, self.free_until, self.most, 1.0)
         states: tuple[State, ...] = (self.state, "warns", "neutral", "neutral", "neutral")
         cut: list[GaugePart] = []
@@ -212,20 +212,20 @@ class GaugePart(NamedTuple):
     name: str
     letter: str
     start: float
-    """Its ends as shares of the period, 0..1."""
+    """Start and end as shares of the period, 0..1 [1]."""
     end: float
     state: State
 
 
 class Card(NamedTuple):
-    """The first answer: whose verdict it is, the verdict, a bar of the period, and named lines."""
+    """The first answer: subject, verdict, a bar of the period, and named lines."""
 
     subject: Sentence
     verdict: Words
     gauge: Gauge | None
     lines: tuple[tuple[str, Sentence], ...]
     details: tuple[tuple[str, Sentence], ...] = ()
-    """Further lines, which only a whole answer shows."""
+    """Further lines that only a whole answer shows."""
 
     @property
     def whole(self) -> "Card":
@@ -239,22 +239,25 @@ class Slider(NamedTuple):
     title: str
     values: tuple[str, ...]
     place: int
-    """Index of the value at first."""
+    """Index of the first value shown."""
 
 
 class Explorer(NamedTuple):
-    """The answer at every setting of two or three sliders; a page shows that of the sliders, other forms the blocks."""
+    """The answer at every setting of two or three sliders.
+
+    A page shows the sliders' one, other forms show the blocks.
+    """
 
     sliders: tuple[Slider, ...]
-    """Along the rows and the columns of each map, and along the maps."""
+    """Sliders along the rows and the columns of each map, and along the maps."""
     cards: tuple[tuple[Card | None, ...], ...]
-    """For each map, row by row, the card of each cell; None where nothing can be."""
+    """Card of each cell, by map, row and column; None for an impossible setting."""
     first_card: Card
-    """That of the sliders' first places."""
+    """Card of the sliders' first places."""
     maps: tuple[Drawing, ...]
-    """With a frame around the cell of the sliders."""
+    """Maps, each with a frame around the cell of the sliders."""
     first_map: int
-    """Number of the map that is shown first."""
+    """Index of the map shown first."""
     blocks: "tuple[Block, ...]"
 
 
@@ -263,9 +266,9 @@ class Detail(NamedTuple):
 
     blocks: "tuple[Block, ...]"
     adds: str = ""
-    """What they are, for the last line of an answer without them; empty where nothing needs to be said."""
+    """Name of the blocks, for the last line of an answer without them; empty where nothing needs to be said."""
     instead: "tuple[Block, ...]" = ()
-    """Blocks that any other answer shows in their place."""
+    """Blocks that other answers show in their place."""
 
 
 class Chapter(NamedTuple):
@@ -276,16 +279,16 @@ class Chapter(NamedTuple):
     kind: str = ""
     """Name for the style sheet: the section has the CSS class `part-<kind>`."""
     key: str = ""
-    """Anchor that links point to; empty if none does."""
+    """Anchor of links to the section; empty without links."""
     is_folded: bool = False
-    """Whether a screen shows its title alone until it is opened; print shows all."""
+    """Whether a screen shows only the title until it is opened; print shows all."""
 
 
 Block = Sentence | Table | Chart | Command | Snippet | Calculation | Card | Explorer | Detail | Chapter
 
 
 class Report(NamedTuple):
-    """An answer, ready for every form; plain values."""
+    """An answer of plain values, ready for every form."""
 
     title: Sentence
     """Title of a page."""
@@ -296,17 +299,17 @@ class Report(NamedTuple):
     records: Sequence[Record] | None = None
     """Rows for CSV; None if the answer is more than one table."""
     is_page: bool = False
-    """If True, every form shows the title; other answers may be part of a page."""
+    """Whether every form shows the title; other answers may be part of a page."""
     is_whole: bool = False
-    """If True, details are shown, and a narrow terminal leaves out no column."""
+    """Whether details are shown, and a narrow terminal leaves out no column."""
     next_commands: tuple[Command, ...] = ()
-    """What to ask next."""
+    """Commands for the next questions."""
     whole_by: str = ""
-    """Says how the reader sees the details that tables leave out; empty in a file."""
+    """Advice on seeing the details that tables leave out; empty in a file."""
 
 
 def first_drawing(blocks: Sequence[Block]) -> Drawing | None:
-    """The first drawing of an answer; None if it has none."""
+    """First drawing of an answer; None without one."""
     for block in blocks:
         drawing = block.drawing if isinstance(block, Chart) else None
         if isinstance(block, Chapter | Detail | Explorer):
@@ -317,16 +320,7 @@ def first_drawing(blocks: Sequence[Block]) -> Drawing | None:
 
 
 def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
-    """Make a sentence from a template.
-
-    Parameters
-    ----------
-    template
-        The text, with {} for each part.
-    parts
-        Figures, code or text that replace the {}.
-    state
-        State of the sentence.
+    """A sentence from a template in which each {} stands for a part.
 
     Examples
     --------
@@ -352,7 +346,7 @@ def joined(*sentences: Sentence, by: str = " ") -> Sentence:
 
 
 def figure_value(figure: Figure, value: Any) -> ShownValue:
-    """Value with the unit and decimals of a registered figure; False fails where True is better."""
+    """A value with the unit and decimals of its figure; False fails where True is better."""
     fails = figure.sort == "truth" and figure.better == "more" and value is False
     decimals = figure.decimals if figure.sort == "number" else None
     return ShownValue(
@@ -366,15 +360,7 @@ def figure_value(figure: Figure, value: Any) -> ShownValue:
 
 
 def attribute_value(figure: Figure, owner: object) -> ShownValue:
-    """Value of a registered figure, read from the attribute of its key.
-
-    Parameters
-    ----------
-    figure
-        The figure.
-    owner
-        Figures by key, or an object with an attribute named `figure.key`.
-    """
+    """Value of a figure, from a mapping by key or from the attribute named `figure.key`."""
     value = owner[figure.key] if isinstance(owner, Mapping) else getattr(owner, figure.key)
     return figure_value(figure, value)
 

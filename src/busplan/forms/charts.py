@@ -1,4 +1,4 @@
-"""Charts as data: cells of a grid, curves, bars in lanes and a circle, with their scales and what their marks mean.
+"""Charts as data: cells of a grid, curves, bars in lanes and a circle, with their scales and legends.
 
 A question gives these records; `forms.svg` draws them as SVG and PNG, `forms.terminal` in characters.
 """
@@ -12,22 +12,22 @@ from busplan.forms.lines import Tone
 from busplan.forms.scale import Tick, round_numbers, ticks
 
 _MOST_ROUND: Final = 7
-"""Most ticks of a logarithmic scale."""
+"""Ticks of a logarithmic scale, at most."""
 
 
 class Entry(NamedTuple):
-    """What a mark means; an entry of the legend, if it has words."""
+    """Meaning of a mark; with words, an entry of the legend."""
 
     ink: str
-    """Its colour: an ink, or another CSS class of `chart.css`."""
+    """Colour of the mark: an ink, or another CSS class of `chart.css`."""
     words: str = ""
     mark: str = ""
-    """A letter or a sign in it."""
+    """Letter or sign of the mark."""
     shape: Literal["area", "line"] = "area"
 
 
 class Ruler(NamedTuple):
-    """A scale."""
+    """A scale of a chart."""
 
     label: str
     """Quantity, with its unit."""
@@ -39,14 +39,14 @@ class Ruler(NamedTuple):
     is_log: bool = False
 
     def share(self, value: float) -> float:
-        """Place of a value on the scale, 0..1 between its ends."""
+        """Place of a value on the scale: 0 at its low end, 1 at its high end [1]."""
         if self.is_log:
             return log(value / self.low) / log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     @property
     def own_tick(self) -> int | None:
-        """Number of the tick of this design."""
+        """Index of this design's tick; None without one."""
         return next((number for number, tick in enumerate(self.ticks) if tick.at == self.own), None)
 
 
@@ -56,11 +56,11 @@ class ChartCell(NamedTuple):
     ink: str
     mark: str = ""
     words: str = ""
-    """Tooltip."""
+    """Tooltip of the cell."""
     tone: Tone = "neutral"
-    """Its colour on a terminal."""
+    """Colour of the cell on a terminal."""
     is_inside: bool | None = None
-    """A line is drawn between cells where it is True and where it is False."""
+    """Whether the cell is inside the line drawn between True and False; None for a cell without a line."""
 
 
 class ChartGrid(NamedTuple):
@@ -76,7 +76,7 @@ class ChartGrid(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """Points that a line joins."""
+    """A line through points."""
 
     entry: Entry
     points: tuple[tuple[float, float | None], ...]
@@ -84,7 +84,7 @@ class Curve(NamedTuple):
     words: tuple[str, ...] = ()
     """Tooltips of the points."""
     has_dots: bool = True
-    """If True, its mark is on every point, else on the last alone."""
+    """Whether every point has the curve's mark; False for the last one alone."""
     has_line: bool = True
 
 
@@ -121,7 +121,7 @@ class Span(NamedTuple):
     start: float
     end: float
     words: str = ""
-    """Tooltip."""
+    """Tooltip of the bar."""
 
 
 class Lane(NamedTuple):
@@ -130,7 +130,7 @@ class Lane(NamedTuple):
     label: str
     spans: tuple[Span, ...]
     note: str = ""
-    """A figure at the end of its row."""
+    """Figure at the end of the row."""
     is_thin: bool = False
 
 
@@ -141,22 +141,22 @@ class Lanes(NamedTuple):
     lanes: tuple[Lane, ...]
     guides: tuple[Guide, ...] = ()
     is_beside: bool = False
-    """If True, labels stand left of their lanes, else above."""
+    """Whether labels are left of their lanes; False for above."""
 
 
 class Dial(NamedTuple):
-    """A band around a circle, between two radii in equal sectors from the x axis on, counter-clockwise.
+    """A band around a circle between two radii, in equal sectors counter-clockwise from the x axis.
 
     Radii are multiples of the nominal radius.
     """
 
     entry: Entry
     inner: tuple[float | None, ...]
-    """None in a sector without points."""
+    """Inner radius of each sector; None in a sector without points."""
     outer: tuple[float | None, ...]
     rings: tuple[tuple[float, Entry], ...]
     words: tuple[str, ...]
-    """Lines in the middle."""
+    """Lines of text in the middle."""
     is_clockwise: bool
 
 
@@ -167,30 +167,30 @@ class Panel(NamedTuple):
     title: str = ""
     words: str = ""
     tone: Tone = "neutral"
-    """Its verdict."""
+    """Verdict of the chart, as a colour."""
 
 
 class Drawing(NamedTuple):
     """Charts one below the other, with one legend."""
 
     title: str
-    """Its message; for screen readers, and at the top of a file."""
+    """Message of the drawing, for screen readers and at the top of a file."""
     panels: tuple[Panel, ...]
     words: tuple[str, ...] = ()
-    """Below the title of a file."""
+    """Text below the title of a file."""
     description: str = ""
-    """For screen readers."""
+    """Description for screen readers."""
     has_characters: bool = False
-    """If True, text and Markdown show it in characters; panels are grids or lanes."""
+    """Whether text and Markdown show the drawing in characters; then its panels are grids or lanes."""
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a circle, which needs no wide place."""
+        """Whether all charts are circles, which need no wide place."""
         return all(isinstance(panel.plot, Dial) for panel in self.panels)
 
 
 def legend(panels: Iterable[Panel]) -> list[Entry]:
-    """Every entry with words of some charts, once, in the order of the drawing."""
+    """Entries with words in some charts, each once, in the order of the drawing."""
     entries = (entry for panel in panels for entry in _entries(panel.plot))
     return list(dict.fromkeys(entry for entry in entries if entry.words))
 
@@ -211,20 +211,10 @@ def _entries(plot: ChartGrid | Curves | Lanes | Dial | None) -> Iterator[Entry]:
 
 
 def numbers(label: str, low: float, high: float, *, most: int = 6, whole: bool = False, room: float = 0.0) -> Ruler:
-    """Make a scale of numbers; a single number gets room at both sides.
+    """A scale of numbers, with room at both sides of a single one.
 
-    Parameters
-    ----------
-    label
-        What the numbers are, with their unit.
-    low, high
-        Ends of the scale.
-    most
-        Most ticks.
-    whole
-        If True, only whole numbers have a tick.
-    room
-        Empty part beyond an end that is not zero, as a share of the scale.
+    `most` is the largest number of ticks; `whole` puts them at whole numbers only. `room` is the empty part beyond an
+    end that is not zero, as a share of the scale.
     """
     size = high - low or (1.0 if whole else abs(low) / 10 or 1.0)
     below, above = (size, size) if high == low else (room * size * bool(low), room * size * bool(high))
@@ -242,33 +232,23 @@ def logarithmic(
     at: Iterable[float] | None = None,
     own: float | None = None,
 ) -> Ruler:
-    """Make a logarithmic scale.
+    """A logarithmic scale from `low` to `high`, both above 0.
 
-    Parameters
-    ----------
-    label
-        What the numbers are, with their unit.
-    low, high
-        Ends of the scale, above 0.
-    write
-        Function that writes a number.
-    at
-        Numbers that have a tick; by default round ones.
-    own
-        That of this design.
+    Ticks are at some numbers, by default round ones, with the label that `write` makes; `own` is the place of this
+    design.
     """
     marks = round_numbers(low, high, most=_MOST_ROUND) if at is None else at
     return Ruler(label, low, high, tuple(Tick(value, write(value)) for value in marks), own, is_log=True)
 
 
 def choices(label: str, names: Iterable[str], *, own: float | None = None) -> Ruler:
-    """Make a scale of names, at 0, 1, 2 and so on; `own` is the place of this design."""
+    """A scale of names at 0, 1, 2 and so on; `own` is the place of this design."""
     marks = tuple(Tick(place, name) for place, name in enumerate(names))
     return Ruler(label, -0.5, len(marks) - 0.5, marks, own)
 
 
 def letters(names: Iterable[str]) -> list[str]:
-    """Choose a letter of each name, none twice; the next letter of the alphabet where all of its own are taken."""
+    """Letters for names, all different: from the name, or the next of the alphabet where all of its own are taken."""
     taken: list[str] = []
     for name in names:
         free = (letter for letter in name + ascii_letters if letter in ascii_letters and letter not in taken)

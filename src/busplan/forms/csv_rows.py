@@ -10,29 +10,23 @@ from busplan.forms.blocks import Report
 
 _BLOCK: Final = 1 << 16
 _LONGEST_CELL: Final = 32_767
-"""Most characters of a cell in a spreadsheet; Python's csv module reads four times as many."""
+"""Length of the longest cell in a spreadsheet [characters]. Python's csv module reads four times as many."""
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
-"""First characters of a text that spreadsheets run as a formula: it could start a program or send data away."""
+"""First characters of a text that spreadsheets run as a formula. It could start a program or send data away."""
 
 
 def to_csv(rows: Sequence[Mapping[str, object]]) -> str:
-    """Write rows with the same keys as CSV with a header; a list becomes words separated by spaces.
+    """CSV of rows with the same keys, with a header; a list becomes words separated by spaces.
 
-    Raises
-    ------
-    ValueError
-        A row has a key that the first row lacks.
+    A row with a key that the first row lacks raises ValueError.
     """
     return "".join(csv_blocks(rows, columns=list(rows[0]))) if rows else ""
 
 
 def csv_blocks(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
-    """Write rows as CSV block by block, so that memory does not grow with the table.
+    """CSV of rows, block by block, so that memory does not grow with the table.
 
-    Raises
-    ------
-    ValueError
-        A row has a key that is not a column.
+    A row with a key that is not a column raises ValueError.
     """
     buffer = io.StringIO()
     writer = csv.DictWriter(buffer, fieldnames=columns, lineterminator="\n")
@@ -47,9 +41,9 @@ def csv_blocks(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) 
 
 
 def csv_cell(value: object) -> object:
-    """Convert a value to a CSV cell; text that a spreadsheet would run as a formula gets an apostrophe in front.
+    """Value of a CSV cell. A text that a spreadsheet would run as a formula gets an apostrophe in front.
 
-    A text that no spreadsheet takes is left out, and says so.
+    A text too long for a spreadsheet is replaced by a remark.
 
     Examples
     --------
@@ -65,7 +59,7 @@ def csv_cell(value: object) -> object:
 
 
 def spelled(value: object) -> object:
-    """Write a boolean in lower case, a list as words and what is missing as nothing; return anything else unchanged."""
+    """A boolean in lower case, a list as words and a missing value as nothing; any other value unchanged."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -76,13 +70,7 @@ def spelled(value: object) -> object:
 
 
 def text(report: Report) -> str:
-    """Write the rows of an answer.
-
-    Raises
-    ------
-    BusplanError
-        The answer is more than one table.
-    """
+    """CSV of an answer. One with more than one table raises BusplanError."""
     if report.records is None:
         raise BusplanError("--format csv: this answer has several tables and CSV holds one; use --format json")
     return to_csv(report.records)

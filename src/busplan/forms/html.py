@@ -1,4 +1,4 @@
-"""An answer as one self-contained HTML file without network; light, dark, narrow and printed styles.
+"""An answer as one HTML file that needs no network, with light, dark, narrow and printed styles.
 
 The sliders of an explorer are the only script.
 """
@@ -27,21 +27,13 @@ from busplan.forms.svg import inline, signed_bar
 
 _DARK_RULES: Final = re.compile(r"@media screen and \(prefers-color-scheme: ?dark\) ?\{([^{}]*\{[^{}]*\})*\s*\}")
 _NOT_ON_LIGHT: Final = '&:not([data-jp-theme-light="true"] *)'
-"""JupyterLab's light theme stays light on a dark desktop."""
+"""Selector against JupyterLab's light theme, which stays light on a dark desktop."""
 
 
 def page(report: Report) -> str:
-    """Write an answer as HTML; text from profiles is escaped.
+    """HTML document of an answer; text from profiles is escaped.
 
-    Parameters
-    ----------
-    report
-        The answer.
-
-    Returns
-    -------
-    str
-        The whole document. The same answer always gives the same document.
+    The same answer always gives the same document.
     """
     blocks = shown_blocks(report)
     script = ""
@@ -62,20 +54,14 @@ def page(report: Report) -> str:
 
 
 def fragment(report: Report) -> str:
-    """Write the blocks of an answer as a piece of HTML for a notebook, whose styles reach nothing outside it.
-
-    Parameters
-    ----------
-    report
-        The answer.
-    """
+    """HTML of an answer's blocks for a notebook. Its styles reach nothing outside it."""
     # A notebook runs no script of ours.
     blocks = [
         piece for block in shown_blocks(report) for piece in (block.blocks if isinstance(block, Explorer) else [block])
     ]
     folder = files("busplan.forms") / "templates"
     chart, style = ((folder / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
-    # The rules are nested in the fragment's own rule, where & stands for its outer element: that is its root.
+    # The rules are nested in the fragment's own rule, where & stands for its outer element, their root.
     sheet = f"{chart}{_colours()}{style}".replace(":root", "&")
     sheet = _DARK_RULES.sub(lambda rules: f"{_NOT_ON_LIGHT} {{\n{rules[0]}\n}}\n", sheet)
     template = _environment().get_template("fragment.html.j2")
@@ -84,7 +70,7 @@ def fragment(report: Report) -> str:
 
 @cache
 def _environment() -> Environment:
-    """Jinja's environment of all templates, which keeps each compiled."""
+    """Jinja's environment of all templates, which keeps the compiled ones."""
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
         autoescape=True,
@@ -114,13 +100,13 @@ def _environment() -> Environment:
 
 
 def _colours() -> str:
-    """Rules of inks, on a light and on a dark background."""
+    """CSS rules of inks, on light and on dark backgrounds."""
     light, dark = fills(".chart")
     return f"{light}{DARK}{{\n{dark}}}\n"
 
 
 def _shown(piece: object) -> object:
-    """Text without control characters: a terminal may show the file."""
+    """Text without control characters, because a terminal may show the file."""
     return printable_lines(piece) if isinstance(piece, str) and not isinstance(piece, Markup) else piece
 
 
@@ -142,13 +128,13 @@ def _role(block: Block) -> str:
 
 
 def _groups(table: Table) -> list[tuple[str, int]]:
-    """Group headings with the number of columns that each spans; empty if no column has a group."""
+    """Group headings, each with the number of columns that it spans; empty without groups."""
     groups = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
     return groups if any(name for name, _ in groups) else []
 
 
 def _settings(explorer: Explorer) -> Markup:
-    """Every card of an explorer as JSON for its script; texts that return are numbered."""
+    """Cards of an explorer as JSON for its script. Repeated texts are replaced by numbers."""
     labels: dict[str, int] = {}
     texts: dict[str, int] = {}
 
@@ -166,12 +152,12 @@ def _settings(explorer: Explorer) -> Markup:
 
     settings = [[setting(card) for card in cards] for cards in explorer.cards]
     text = json.dumps({"labels": [*labels], "texts": [*texts], "settings": settings}, separators=(",", ":"))
-    # No text of a profile ends the element.
+    # No text of a profile can end the element.
     return Markup(text.replace("<", "\\u003c"))  # noqa: S704 - as above
 
 
 def _shares(gauge: Gauge | None) -> list[tuple[str, float, float]] | None:
-    """Class of each part of a bar, and its ends in percent."""
+    """Class of each part of a bar, with its ends [%]."""
     if gauge is None:
         return None
     parts = [

@@ -1,4 +1,4 @@
-"""Colours of drawings by ink, on light and on dark backgrounds, and the style sheet of a drawing that is a file."""
+"""Colours of drawings by ink, on light and on dark backgrounds, and the style sheet of a drawing in a file."""
 
 import re
 from collections.abc import Mapping
@@ -14,9 +14,9 @@ class InkColours(NamedTuple):
     """Colours of one ink."""
 
     light: str
-    """On a light background."""
+    """Colour on a light background."""
     dark: str
-    """On a dark background."""
+    """Colour on a dark background."""
 
 
 INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
@@ -50,7 +50,7 @@ INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
 
 
 def fills(scope: str) -> tuple[str, str]:
-    """CSS rules that colour each ink inside a selector: for a light background and for a dark one."""
+    """CSS rules that colour each ink inside a selector, for a light and for a dark background."""
     light, dark = (
         "".join(f"{scope} .{ink}{{color:{colours[side]};fill:{colours[side]}}}\n" for ink, colours in INKS.items())
         for side in (0, 1)
@@ -60,24 +60,19 @@ def fills(scope: str) -> tuple[str, str]:
 
 _PAPER: Final = ".chart{background:var(--paper)}\n.chart .paper{fill:var(--paper)}\n"
 _SHEET_OF_PAPER: Final = '<rect class="paper" width="100%" height="100%"/>'
-"""For viewers that have no background of an SVG."""
+"""Background for viewers that have none for an SVG."""
 _ROOT: Final = re.compile(r":root\s*\{([^}]*)\}")
 _DARK_ROOT: Final = re.compile(r"\A.*?\}\s*\}\n", re.DOTALL)
-"""The variables at the top of the style sheet: for light backgrounds, and for dark ones."""
+"""Variables at the top of the style sheet, for light and for dark backgrounds."""
 _VARIABLE: Final = re.compile(r"(--[\w-]+):\s*([^;]+);")
 _THEMED: Final = re.compile(r"[^{}]*\{[^{}]*var\([^{}]*\}")
 """A rule with a variable."""
 
 
 def styled(svg: str) -> str:
-    """Add the style sheet of the page's charts to a drawing.
+    """A drawing with the style sheet of the page's charts.
 
-    Each colour stands in it twice, for light and for dark backgrounds: not every viewer of SVG knows variables.
-
-    Parameters
-    ----------
-    svg
-        The drawing.
+    Each colour is in it twice, for light and for dark backgrounds, because some viewers of SVG do not know variables.
     """
     chart = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
     light, dark = (dict(_VARIABLE.findall(block)) for block in _ROOT.findall(chart))

@@ -1,4 +1,4 @@
-"""Lines of text, plain or coloured, and wrapped at spaces: a figure stays whole and beside its unit."""
+"""Lines of text, plain or coloured, wrapped at spaces. A figure stays whole and beside its unit."""
 
 import io
 import re
@@ -22,7 +22,7 @@ _STYLES: Final[dict[Tone, str]] = {
 
 
 class Mark(NamedTuple):
-    """Part of a line with its own tone."""
+    """A part of a line with its own tone."""
 
     start: int
     end: int
@@ -30,7 +30,7 @@ class Mark(NamedTuple):
 
 
 class Line(NamedTuple):
-    """One line."""
+    """A line of text."""
 
     text: str
     tone: Tone = "neutral"
@@ -41,12 +41,12 @@ BLANK: Final = Line("")
 
 
 def plain_text(lines: Iterable[Line]) -> str:
-    """Write lines without colours, each with a newline and with control characters escaped."""
+    """Text of lines without colours, each with a newline and with control characters escaped."""
     return "".join(f"{printable(line.text)}\n" for line in lines)
 
 
 def styled_text(lines: Iterable[Line]) -> str:
-    """Write lines for a terminal, in its colours; NO_COLOR is honoured."""
+    """Text of lines in a terminal's colours; NO_COLOR is honoured."""
     from rich.console import Console
     from rich.text import Text
 
@@ -61,20 +61,13 @@ def styled_text(lines: Iterable[Line]) -> str:
 
 
 _BREAK: Final = re.compile(r"(?<!\d)(?<!\+/-) +|(?<=\d) +(?![A-Za-z%])")
-"""Where a line may end: not between a figure and its unit, nor between +/- and its figure."""
+"""Places where a line may end: not between a figure and its unit, nor between +/- and its figure."""
 
 
 def wrapped(line: Line, width: int | None, *, hang: int = 0) -> list[Line]:
-    """Wrap a line at spaces; a word longer than a line is broken.
+    """Wrap a line at spaces, after `hang` spaces from the second line on. A word longer than a line is broken.
 
-    Parameters
-    ----------
-    line
-        The line.
-    width
-        Most characters of a line; None for any number.
-    hang
-        Spaces before each line but the first.
+    `width` is the largest number of characters of a line; None for any.
 
     Examples
     --------
@@ -108,7 +101,7 @@ def _spans(text: str, width: int, hang: int) -> Iterator[tuple[int, int]]:
 
 
 def least_width(text: str) -> int:
-    """Width of the longest piece of a text that no line break divides.
+    """Width of the longest piece of a text between two possible line ends [columns].
 
     Examples
     --------
@@ -120,19 +113,11 @@ def least_width(text: str) -> int:
 
 _HEAD: Final = "Legend: "
 _UNBROKEN: Final = "\xa0"
-"""A space at which no line ends."""
+"""Space at which no line ends."""
 
 
 def legend_lines(words: Sequence[str], *, width: int) -> Iterator[Line]:
-    """Write the entries of a legend, wrapped to a width between two entries.
-
-    Parameters
-    ----------
-    words
-        The entries.
-    width
-        Most columns of a line.
-    """
+    """Legend in lines of at most `width` columns, wrapped between two entries."""
     entries = ", ".join(word.replace(" ", _UNBROKEN) for word in words)
     indent = " " * len(_HEAD)
     for line in wrap(

@@ -31,16 +31,16 @@ from busplan.forms.numbers import cell_text, part_text, shown_blocks, with_unit
 from busplan.forms.terminal import drawing_lines
 
 _INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:$]|(?<=www)\.")
-"""Markup inside a line, and characters that turn plain words into a link, a mention or a formula."""
+"""Markup inside a line, and characters that turn words into a link, a mention or a formula."""
 _AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=#])")
 """Markup at the start of a line: a list, a heading or a rule."""
 
 BAR: Final = r"\|"
-"""Escaped bar in a cell; code needs it, too: Markdown splits a table into cells first."""
+"""Escaped bar in a cell. Code needs it, too, because Markdown splits a table into cells first."""
 
 
 def escaped(text: str) -> str:
-    r"""Escape Markdown.
+    r"""Text with Markdown escaped.
 
     Examples
     --------
@@ -51,12 +51,7 @@ def escaped(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Write text as inline code; control characters are escaped.
-
-    Parameters
-    ----------
-    text
-        Any text; line ends become spaces.
+    """Inline code of a text; line ends become spaces, and control characters are escaped.
 
     Examples
     --------
@@ -72,21 +67,9 @@ def code(text: str) -> str:
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int | Sequence[bool]) -> list[str]:
-    r"""Lay out a table.
+    r"""Lines of a table; headings and cells are Markdown, and bars in cells are escaped here.
 
-    Parameters
-    ----------
-    headings
-        One for each column, in Markdown.
-    rows
-        Cells in Markdown, as many as headings; bars are escaped here.
-    left
-        Which columns are left-aligned: one flag each, or how many of the first. The others are right-aligned.
-
-    Returns
-    -------
-    list
-        Lines of Markdown, without line ends.
+    `left` tells left-aligned columns: one flag each, or their number from the first. Others are right-aligned.
 
     Examples
     --------
@@ -99,19 +82,13 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int |
 
 
 _TEXT_WIDTH: Final = 80
-"""Width of a drawing in characters, in columns."""
+"""Width of a drawing in characters [columns]."""
 _COMMENT_LEVEL: Final = 3
-"""Title level of an answer that stands inside a page, as in a comment on a change."""
+"""Title level of an answer inside a page, such as a comment on a change."""
 
 
 def text(report: Report) -> str:
-    """Write an answer in Markdown.
-
-    Parameters
-    ----------
-    report
-        The answer.
-    """
+    """Markdown of an answer."""
     blocks = shown_blocks(report)
     level = 1 if report.is_page else _COMMENT_LEVEL
     lines = (f"{'#' * level} {_sentence(report.title)}", *_blocks(blocks, level=level + 1))
@@ -119,7 +96,7 @@ def text(report: Report) -> str:
 
 
 def _blocks(blocks: Sequence[Block], *, level: int) -> Iterator[str]:
-    """Lines of blocks, with a blank line before each; neighbouring commands are one listing."""
+    """Lines of blocks, each after a blank line; neighbouring commands are one listing."""
     for are_commands, run in groupby(blocks, key=lambda block: isinstance(block, Command)):
         if are_commands:
             yield from ("", "```sh", *(command.line for command in run if isinstance(command, Command)), "```")
@@ -158,7 +135,7 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
 
 
 def _chart(chart: Chart) -> Iterator[str]:
-    """A drawing in characters, or else what it shows in words."""
+    """A drawing in characters, or else its content in words."""
     if chart.drawing.has_characters:
         drawn = plain_text(drawing_lines(chart.drawing, _TEXT_WIDTH)).splitlines()
         yield from (*_caption(chart.caption), "```text", *drawn, "```")
@@ -171,7 +148,7 @@ def _caption(caption: Sentence | None) -> tuple[str, ...]:
 
 
 def _sentence(sentence: Sentence) -> str:
-    # Escape text and figures together: markup may span both. Code is escaped by itself.
+    # Text and figures are escaped together, because markup may span both; code is escaped by itself.
     pieces: list[str] = []
     for is_code, run in groupby(sentence.parts, key=lambda part: isinstance(part, Code)):
         if is_code:
@@ -191,7 +168,7 @@ def _part(part: Part) -> str:
 
 
 def _table(block: Table) -> list[str]:
-    # Columns of drawings are left out: the figure is in another column.
+    # Columns of drawings are left out, since another column has the figure.
     shown = [number for number, column in enumerate(block.columns) if column.kind != "drawing"]
     columns = [block.columns[number] for number in shown]
     headings = [
@@ -217,7 +194,7 @@ def _cell(cell: Cell) -> str:
         case Command() | Code():
             return code(cell_text(cell))
         case Swatch():
-            # The mark stands for a colour, and Markdown has none.
+            # The mark stands for a colour, which Markdown does not have.
             return escaped(cell.text)
     return escaped(cell_text(cell))
 

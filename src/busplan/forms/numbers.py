@@ -26,19 +26,19 @@ from busplan.forms.lines import Line, Mark
 
 MISSING: Final = "-"
 _DIGITS: Final = 12
-"""Most digits of a number; further ones are float rounding."""
+"""Digits of a number, at most; further ones are float rounding."""
 _FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6, ("us", "us/byte"): 1.0}
-"""Factor from the unit of a key to the unit it is written in; the key `per_byte_us` is in us/byte."""
+"""Factors from the unit of a key to the written unit. The key `per_byte_us` is in us/byte."""
 _MILLISECOND_US: Final = 1e3
 _SECOND_US: Final = 1e6
 SILENT_UNITS: Final = frozenset(("", "1", "nodes", "axes"))
-"""Units that a sentence does not repeat after a figure: a noun names them."""
+"""Units that a sentence does not repeat after a figure, because a noun names them."""
 ROUNDING_UM: Final = 1e-6
-"""Lengths below a picometre, in um, are float rounding."""
+"""Length below which figures are float rounding: a picometre [um]."""
 
 
 def figure_text(value: ShownValue) -> str:
-    """Write a figure without its unit.
+    """A figure without its unit.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def figure_text(value: ShownValue) -> str:
 
 
 def with_unit(value: ShownValue) -> str:
-    """Write a figure with its unit, as in a sentence.
+    """A figure with its unit, as in a sentence.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def unit_text(value: ShownValue) -> str:
 
 
 def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
-    """Write a number with fixed decimals, below 0 to tens and hundreds; one too small has three digits.
+    """A number with fixed decimals, below 0 to tens and hundreds; one too small has three digits.
 
     Examples
     --------
@@ -106,13 +106,15 @@ def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
 _UNKNOWN_DIGITS: Final = 3
 """Significant digits of a number whose uncertainty is unknown."""
 _MOST_DECIMALS: Final = 6
-"""Most decimals of a time in us: below a picosecond there is only float rounding."""
+"""Decimals of a time in us, at most; below a picosecond there is only float rounding."""
 _TWO_DIGITS: Final = 100.0
-"""Uncertainty from which on it has two digits, and not one or all before the decimal point."""
+"""Uncertainty from which it has two digits; a smaller one has one, or all before the decimal point."""
 
 
 def known_decimals(number: float, uncertainty: float | None) -> int:
-    """Decimals of a number that its uncertainty allows, below 0 for tens and hundreds; without one, three digits.
+    """Decimals of a number that its uncertainty allows, below 0 for tens and hundreds.
+
+    A number without uncertainty gets three digits.
 
     Examples
     --------
@@ -127,7 +129,7 @@ def known_decimals(number: float, uncertainty: float | None) -> int:
 
 
 def known_text(number: float, uncertainty: float | None) -> str:
-    """Write a number with as many digits as its uncertainty allows, never as a power of ten.
+    """A number with as many digits as its uncertainty allows, never as a power of ten.
 
     Examples
     --------
@@ -151,12 +153,15 @@ def period_value(period_us: float) -> ShownValue:
 
 
 def period(period_us: float) -> str:
-    """Write a communication period in s, ms or us, by its size."""
+    """A communication period in s, ms or us, by its size, as text."""
     return with_unit(period_value(period_us))
 
 
 def factor_of(value: ShownValue) -> float:
-    """Factor to the unit a value is written in; KeyError for an unknown pair. A key without a unit has that unit."""
+    """Factor from the unit of the key to the written unit. A key without a unit is in the written one.
+
+    An unknown pair raises KeyError.
+    """
     unit = unit_of(value.key)
     if unit == value.unit or not value.unit or (not unit and value.unit != "%"):
         return 1.0
@@ -179,7 +184,7 @@ def _number(value: ShownValue) -> str:
 
 
 def cell_text(cell: Cell) -> str:
-    """Write a cell as plain text."""
+    """A cell as plain text."""
     match cell:
         case str():
             return cell
@@ -196,17 +201,17 @@ def cell_text(cell: Cell) -> str:
 
 
 def sentence_text(sentence: Sentence) -> str:
-    """Write a sentence as plain text."""
+    """A sentence as plain text."""
     return "".join(map(part_text, sentence.parts))
 
 
 def part_text(part: Part) -> str:
-    """Write a piece of a sentence as plain text, a figure with its unit."""
+    """A piece of a sentence as plain text, a figure with its unit."""
     return with_unit(part) if isinstance(part, ShownValue) else cell_text(part)
 
 
 def sentence_line(sentence: Sentence) -> Line:
-    """Write a sentence as a line: words with a state are marked; without any, the state is that of the sentence."""
+    """A sentence as a line. Words with a state are marked; without any, the line has the state of the sentence."""
     text, marks = "", list[Mark]()
     for part in sentence.parts:
         start, text = len(text), text + printable(part_text(part))
@@ -216,13 +221,7 @@ def sentence_line(sentence: Sentence) -> Line:
 
 
 def shown_blocks(report: Report) -> Sequence[Block]:
-    """Content of an answer for a page or a comment, without rows of detail unless it is whole.
-
-    Parameters
-    ----------
-    report
-        The answer.
-    """
+    """Content of an answer for a page or a comment, without details unless it is whole."""
     blocks = report.blocks
     if report.is_whole:
         return list(_with_details(blocks))
@@ -230,7 +229,7 @@ def shown_blocks(report: Report) -> Sequence[Block]:
 
 
 def not_shown(report: Report) -> tuple[Sentence, ...]:
-    """The last line of an answer that is not whole: which blocks it leaves out, and how to see them."""
+    """Last line of an answer that is not whole: the blocks left out, and the way to see them."""
     words = [] if report.is_whole else list(dict.fromkeys(_adds(report.blocks)))
     return (Sentence((f"Not shown: {listed(words, 'and')}. {report.whole_by}".rstrip(),)),) if words else ()
 
@@ -277,16 +276,7 @@ def _without_details(blocks: Sequence[Block], whole_by: str) -> Iterator[Block]:
 
 
 def left_out_sentence(rows: int, columns: Sequence[str] = (), *, whole_by: str) -> str:
-    """Say what a table leaves out, and how to see it; empty if that is nothing.
-
-    Parameters
-    ----------
-    rows
-        How many rows.
-    columns
-        Names of the columns.
-    whole_by
-        Says how to see it.
+    """Sentence on what a table leaves out, with the way to see it; empty for nothing.
 
     Examples
     --------

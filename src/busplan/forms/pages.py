@@ -8,11 +8,11 @@ from rich.syntax import Syntax
 from rich.text import TextType
 from rich.theme import Theme
 
-_STYLES = Theme({"markdown.code": "bold cyan"})  # on the terminal's own ground, light or dark
+_STYLES = Theme({"markdown.code": "bold cyan"})  # On the terminal's own ground, light or dark.
 
 
 class _Cell(TableDataElement):
-    """A cell of a table whose long words are folded, where rich cuts them off."""
+    """A cell of a table that folds long words, where rich cuts them off."""
 
     def on_text(self, context: MarkdownContext, text: TextType) -> None:
         super().on_text(context, text)
@@ -32,7 +32,7 @@ class _Page(Markdown):
 
 
 def rendered(markdown: str) -> str:
-    """Write Markdown for a terminal of this width, in its colours; NO_COLOR is honoured."""
+    """Markdown for a terminal, at its width and in its colours; NO_COLOR is honoured."""
     buffer = io.StringIO()
     console = Console(file=buffer, force_terminal=True, theme=_STYLES)
     console.print(_Page(markdown, code_theme="ansi_dark", hyperlinks=False))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class RoundStep(NamedTuple):
-    """1, 2 or 5 times a power of ten."""
+    """A step of 1, 2 or 5 times a power of ten."""
 
     factor: int
     power: int
@@ -25,12 +25,7 @@ class Tick(NamedTuple):
 
 
 def round_steps(near: float) -> tuple[RoundStep, ...]:
-    """Round steps around a size, from a tenth of its power of ten to ten times that.
-
-    Parameters
-    ----------
-    near
-        The size, above 0.
+    """Round steps around a size above 0, from a tenth of its power of ten to ten times that.
 
     Examples
     --------
@@ -42,7 +37,7 @@ def round_steps(near: float) -> tuple[RoundStep, ...]:
 
 
 def ring_step(largest: float) -> float:
-    """Round step that divides up to `largest` into two to five parts.
+    """Round step that divides `largest`, or somewhat less, into two to five parts.
 
     Examples
     --------
@@ -55,16 +50,10 @@ def ring_step(largest: float) -> float:
 def round_numbers(
     low: float, high: float, *, most: int, decades: Sequence[Sequence[float]] = ((1, 2, 5), (1, 3), (1,))
 ) -> list[float]:
-    """Labels of a logarithmic scale: 1, 2 and 5 times powers of ten, fewer where these are too many.
+    """Numbers for the labels of a logarithmic scale: 1, 2 and 5 times powers of ten, fewer if these are too many.
 
-    Parameters
-    ----------
-    low, high
-        Ends of the scale, above 0.
-    most
-        Largest number of labels, 1 or more.
-    decades
-        Choices of the labels between 1 and 10, the finest first; of the last one every n-th is taken.
+    `low` must be above 0, and `most` at least 1. `decades` are choices of the labels from 1 to 10, the finest first; of
+    the last one every n-th is taken.
 
     Examples
     --------
@@ -81,14 +70,7 @@ def round_numbers(
 
 
 def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
-    """Tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
-
-    Parameters
-    ----------
-    low, high
-        The window, in any unit.
-    most
-        Largest number of marks, 1 or more.
+    """At most `most` tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
 
     Examples
     --------
@@ -97,7 +79,7 @@ def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     >>> [tick.label for tick in ticks(0.0, 0.3, most=4)]
     ['0.0', '0.1', '0.2', '0.3']
     """
-    # A step longer than this gives at most `most` marks, wherever the window begins.
+    # A longer step gives at most `most` marks, wherever the window begins.
     smallest = (high - low) / most * (1 + 1e-6)
     step = next(size for size in round_steps(smallest) if size.size > smallest)
     first, last = ceil(low / step.size - 1e-9), floor(high / step.size + 1e-9)
@@ -108,23 +90,10 @@ def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
 def placed(
     labels: Sequence[tuple[float, float]], *, room: float, gap: float = 0.0, own: int | None = None
 ) -> dict[int, float]:
-    """Place labels in the middle of their places, this design's first, as far as none touches another.
+    """Starts of labels, by index, around their places; this design's label comes first, and none touches another.
 
-    Parameters
-    ----------
-    labels
-        Place and size of each label.
-    room
-        End of the scale, which no label leaves.
-    gap
-        Least distance of two labels.
-    own
-        Label of this design.
-
-    Returns
-    -------
-    dict
-        Where each label that has room begins, by its number.
+    Labels are places and sizes. `room` is the end of the scale, `gap` the least distance of two labels, `own` the label
+    of this design. A label without room is left out.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Drawings as SVG: widths are in percent, so that a drawing fills its container and text keeps its size."""
+"""Drawings as SVG. Widths are in percent, so that a drawing fills its container and text keeps its size."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -32,23 +32,18 @@ if TYPE_CHECKING:
 
 
 WIDTH: Final = 640
-"""Width that a PNG gives to a drawing as wide as its container, in px."""
+"""Width of a PNG of a drawing as wide as its container [px]."""
 _ZOOM: Final = 2.0
-"""Pixels of the PNG for a px of the SVG."""
+"""Pixels of the PNG for a px of the SVG [1]."""
 _MOST_HEIGHT: Final = 16_000
-"""Largest height in pixels: a drawing that would be higher is enlarged by less than `_ZOOM`."""
+"""Largest height [pixels]. A drawing that would be higher is enlarged by less than `_ZOOM`."""
 _FONT: Final = '* {font-family:"DejaVu Sans Subset" !important}'
 
 
 def png(svg: str) -> bytes:
-    """Convert a drawing of `busplan.forms.svg`; the same drawing gives the same bytes.
+    """PNG of a drawing as wide as its container, with its style sheet; the same drawing gives the same bytes.
 
-    Characters that the font lacks are of a font of this computer, and a box where none has them.
-
-    Parameters
-    ----------
-    svg
-        A drawing as wide as its container, with its style sheet.
+    Characters that the font lacks come from a font of this computer, or are boxes if none has them.
     """
     import resvg_py
 
@@ -65,33 +60,26 @@ def png(svg: str) -> bytes:
 
 
 _PHONE: Final = 335
-"""Width of a phone without margins, in px."""
+"""Width of a phone without margins [px]."""
 _MARGIN: Final = 2.5
-"""Empty part at each side of a file, in percent."""
+"""Margin at each side of a file [%]."""
 _LINE: Final = 20
-"""Height of a line of text, in px."""
+"""Height of a line of text [px]."""
 _GAP: Final = 12
 _LETTER, _SMALL_LETTER = 8, 7
-"""Width of a letter, about, in px."""
+"""Approximate width of a letter [px]."""
 _NAMESPACE: Final = "http://www.w3.org/2000/svg"
 
 
 def inline(drawing: Drawing) -> str:
-    """Draw it for a page, which has the style sheet."""
+    """A drawing for a page that has the style sheet."""
     return _drawn(drawing, room=_PHONE)
 
 
 def content(drawing: Drawing, form: "Picture", *, note: str = "") -> str | bytes:
-    """Draw it as a file of its own, with its title; a screen of 320 px or more has room for it.
+    """A drawing as a file of its own, with its title and a note after it. A screen of 320 px has room for it.
 
-    Parameters
-    ----------
-    drawing
-        The drawing.
-    form
-        Form of the file; png needs the extra `plot`.
-    note
-        Words after the title.
+    A png needs the extra `plot`.
     """
     drawing = drawing._replace(title=f"{drawing.title} {note}".rstrip())
     if form == "svg":
@@ -124,14 +112,14 @@ def _root(title: str) -> Element:
 
 
 def _markup(root: Element, *, height: float) -> str:
-    """Write a drawing; text is escaped."""
+    """SVG of a drawing; its text is escaped."""
     root.set("height", f"{height:.0f}")
     indent(root)
     return tostring(root, encoding="unicode") + "\n"
 
 
 def _inside(parent: Element, *, left: float, width: float) -> Element:
-    """A nested drawing with its own width, in percent; content at its edge may overflow."""
+    """A nested drawing with its own width [%]; content at its edge may overflow."""
     return SubElement(parent, "svg", {"x": f"{left:.5g}%", "width": f"{width:.5g}%", "overflow": "visible"})
 
 
@@ -141,7 +129,7 @@ def _text(parent: Element, text: str, *, x: str = "0", y: float, css: str = "", 
 
 
 def _rect(parent: Element, *, x: str = "0", y: float, width: str, height: float, css: str, title: str = "") -> None:
-    """Draw a box; its title is a tooltip."""
+    """Draw a box, with its title as a tooltip."""
     box = {"x": x, "y": f"{y:.5g}", "width": width, "height": f"{height:.5g}", "class": css}
     rect = SubElement(parent, "rect", box)
     if title:
@@ -149,7 +137,7 @@ def _rect(parent: Element, *, x: str = "0", y: float, width: str, height: float,
 
 
 def _frame(parent: Element, *, x: str, y: float, width: str, height: float) -> None:
-    """Draw an empty box that is seen on any colour."""
+    """Draw an empty box that is visible on any colour."""
     for css in ("halo", "frame"):
         _rect(parent, x=x, y=y, width=width, height=height, css=css)
 
@@ -174,56 +162,54 @@ class _Area(NamedTuple):
     """A plot between two scales."""
 
     area: Element
-    """Text and marks: x in percent, y in px of the drawing."""
+    """Element with text and marks: x in percent, y in px of the drawing."""
     plot: ChartGrid | Curves
     top: float
     width: float
     height: float
 
     def x(self, value: float) -> str:
-        """The x of a value, in percent."""
+        """The x of a value [%]."""
         return _percent(self.plot.across.share(value))
 
     def y(self, value: float) -> float:
-        """The y of a value, in px."""
+        """The y of a value [px]."""
         return self.top + self.height * (1 - self.plot.up.share(value))
 
     def paths(self) -> Element:
-        """A place for paths in the coordinates of `point`, clipped to the plot; stretched with it but in a PNG."""
+        """Element for paths in the coordinates of `point`, clipped to the plot.
+
+        Except in a PNG it stretches with the plot.
+        """
         box = {"y": f"{self.top:g}", "width": "100%", "height": f"{self.height:g}", "preserveAspectRatio": "none"}
         return SubElement(self.area, "svg", {**box, "viewBox": f"0 0 {self.width:.1f} {self.height:g}"})
 
     def point(self, x: float, y: float) -> str:
-        """Coordinates of a point of a path, from shares of the plot's width and height."""
+        """Coordinates of a point in a path, from shares of the plot's width and height."""
         return f"{self.width * x:.1f} {self.height * (1 - y):.1f}"
 
 
 _GUTTER: Final = 40.0
-"""Widest part left of a plot, in percent."""
+"""Width of the part left of a plot, at most [%]."""
 _ROW: Final = 16
-"""Least distance of two labels, up, in px."""
+"""Least distance of two labels, up [px]."""
 _TALL, _MOST_TALL, _HEIGHT = 20, 32, 520
-"""Height of a row of cells, how many may have it, and that of all rows of more, in px."""
+"""Height of a row of cells, largest number of rows with it, and height of all rows where there are more [px]."""
 _FAR: Final = 48
-"""Distance of the marks of small cells, in px."""
+"""Distance of the marks of small cells [px]."""
 _CURVES: Final = 240
-"""Height of curves, in px."""
+"""Height of curves [px]."""
 _BAR, _THIN_BAR = 18, 8
 _BESIDE, _MOST_BESIDE = 22, 24
-"""Pitch of lanes with labels beside them, and how many may have it; of more the pitch is `_ROW`."""
+"""Pitch of lanes with labels beside them [px], and largest number of lanes with it; more have the pitch `_ROW`."""
 _LETTER_PERCENT: Final = 4.5
-"""Narrowest bar that has room for its letter on a phone."""
+"""Width of the narrowest bar with room for its letter on a phone [%]."""
 
 
 class _Sheet:
-    """A drawing that grows downwards.
+    """A drawing that grows downwards, in the element `body`.
 
-    Parameters
-    ----------
-    body
-        Element that it is drawn in.
-    room
-        Narrowest width that its text must fit in, in px.
+    Its text must fit in a width of `room` px.
     """
 
     def __init__(self, body: Element, room: float) -> None:
@@ -298,7 +284,7 @@ class _Sheet:
         return _Area(area, plot, top, width, height)
 
     def _across(self, area: Element, ruler: Ruler, *, room: float) -> None:
-        """Draw the ticks of a scale below a plot that is `room` px wide or more."""
+        """Draw the ticks of a scale below a plot at least `room` px wide."""
         labels = [(room * ruler.share(tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
         for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=ruler.own_tick).items():
             (at, size), tick = labels[number], ruler.ticks[number]
@@ -317,7 +303,7 @@ class _Sheet:
         area = self._area(grid, height=tall * rows)
         is_fine = max(rows, columns) > _MOST_TALL
         css, wide = "fine" if is_fine else "cell", 1 / columns
-        # Small cells have a mark now and then.
+        # Small cells have a mark only now and then.
         every = (_FAR // (self._room * wide) + 1, ceil(_GAP / tall)) if is_fine else (1, 1)
         for number, row in enumerate(grid.rows):
             y, start = area.top + tall * (rows - number - 1), 0
@@ -343,7 +329,7 @@ class _Sheet:
 
     @staticmethod
     def _marks(area: Element, row: Sequence[ChartCell | None], *, y: float, every: int) -> None:
-        """Write the marks of a row, one for `every` cells that are alike, as one text: a page has many maps."""
+        """Write the marks of a row, one for `every` alike cells, as one text, because a page has many maps."""
         marks, places, start = "", [], 0
         for mark, run in groupby("" if cell is None else cell.mark for cell in row):
             size = len(list(run))
@@ -449,7 +435,7 @@ def _path(area: _Area, curve: Curve) -> str:
 
 
 def _span(area: Element, span: Span, ruler: Ruler, *, y: float, height: float) -> None:
-    """Draw a bar, and its letter if there is room."""
+    """Draw a bar, with its letter if there is room."""
     start, end = (100 * min(1.0, max(0.0, ruler.share(at))) for at in (span.start, span.end))
     width, ink = f"{end - start:.5g}%", span.entry.ink
     _rect(area, x=f"{start:.5g}%", y=y, width=width, height=height, css=ink, title=span.words)
@@ -459,23 +445,23 @@ def _span(area: Element, span: Span, ruler: Ruler, *, y: float, height: float) -
 
 
 _DIAL: Final = (420, 380)
-"""Width and height of a circle with its labels, in px."""
+"""Width and height of a circle with its labels [px]."""
 _NOMINAL: Final = 128
-"""Radius of the nominal circle."""
+"""Radius of the nominal circle [px]."""
 _ENDS: Final = (("X 0°", 1, 0, "start"), ("Y 90°", 0, -1, "middle"), ("180°", -1, 0, "end"), ("270°", 0, 1, "middle"))
-"""Axes and angles at the ends of the cross, and where they are."""
+"""Axes and angles at the ends of the cross, with their places."""
 _ARROW, _ARROW_DEG = 0.62, (20, 65)
-"""Radius of the arrow, as a multiple of the nominal radius, where no error is drawn; its start and end."""
+"""Radius of the arrow as a multiple of the nominal radius, where no error is drawn, and its start and end [deg]."""
 
 
 def _place(angle_deg: float, radius: float) -> str:
-    """Coordinates; y points down in SVG."""
+    """Coordinates in the drawing; y points down in SVG."""
     radius *= _NOMINAL
     return f"{radius * cos(radians(angle_deg)):.1f} {-radius * sin(radians(angle_deg)):.1f}"
 
 
 def _arrow(*, is_clockwise: bool) -> str:
-    """An arc inside the circle with a head at its end."""
+    """An arc inside the circle, with a head at its end."""
     start, end = reversed(_ARROW_DEG) if is_clockwise else _ARROW_DEG
     back, size = end + (start - end) / 5, _ARROW * _NOMINAL
     arc = f"M{_place(start, _ARROW)}A{size:.1f} {size:.1f} 0 0 {int(is_clockwise)} {_place(end, _ARROW)}"
@@ -499,21 +485,11 @@ def _outlines(dial: Dial) -> Iterator[str]:
 
 
 _CELL_BAR: Final = 16
-"""Height of a bar in a table, in px."""
+"""Height of a bar in a table [px]."""
 
 
 def signed_bar(value: float, *, least: float, most: float, title: str) -> str:
-    """Draw one value as a bar in a table.
-
-    Parameters
-    ----------
-    value
-        Value of the bar.
-    least, most
-        Ends of the scale, least <= 0 <= most.
-    title
-        Title for screen readers.
-    """
+    """A value as a bar in a table, on a scale with least <= 0 <= most. The title is for screen readers."""
     root = _root(title)
     zero, end = ((mark - least) / (most - least) for mark in (0.0, value))
     box = {"x": _percent(min(zero, end)), "width": _percent(abs(end - zero))}

@@ -1,4 +1,4 @@
-"""An answer as lines of text: coloured for a terminal, plain for a pipe or a file."""
+"""An answer as lines of text, coloured for a terminal, plain for a pipe or a file."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
@@ -29,16 +29,16 @@ from busplan.forms.scale import placed
 from busplan.forms.text_table import table_lines
 
 _WIDTH: Final = 80
-"""Width of a card and of a drawing without a terminal, and the largest width of a card, in columns."""
+"""Width of a card and of a drawing without a terminal, and largest width of a card [columns]."""
 _CARD_INDENT: Final = "  "
 _LABEL: Final = 18
-"""Where the words of a line begin."""
+"""Column at which the words of a line begin."""
 _GAP: Final = 2
-"""Fewest blanks between subject and verdict."""
+"""Blanks between subject and verdict, at least."""
 
 
 def _card_lines(card: Card, width: int | None) -> list[Line]:
-    """A card as lines, in the width of the terminal, if there is one."""
+    """A card as lines, in the width of the terminal if there is one."""
     room = min(width or _WIDTH, _WIDTH)
     lines = [*_head(card, room), *([_bar(card.gauge, room)] if card.gauge else [])]
     for label, words in card.lines:
@@ -50,7 +50,7 @@ def _card_lines(card: Card, width: int | None) -> list[Line]:
 
 
 def _head(card: Card, width: int) -> list[Line]:
-    """Subject on the left and verdict on the right; below each other where they need more than a line."""
+    """Subject on the left and verdict on the right, or below each other if they need more than a line."""
     subject, verdict = sentence_line(card.subject).text, printable(card.verdict.text)
     gap = width - len(subject) - len(verdict)
     if gap < _GAP:
@@ -64,7 +64,7 @@ def _head(card: Card, width: int) -> list[Line]:
 
 
 def _bar(gauge: Gauge, width: int) -> Line:
-    """The period: # used, ~ in doubt, . free, r to stay free; the cycle may use it up to |."""
+    """A bar of the period: # used, ~ in doubt, . free, r to stay free; the cycle may use it up to |."""
     cells = width - len(_CARD_INDENT) - 2
     marks = list[Mark]()
     text = ""
@@ -83,11 +83,11 @@ _BRACKETED: Final = 3
 _OWN_ROW, _OWN_COLUMN = ">", "^"
 _OWN: Final = f"{_OWN_ROW} and {_OWN_COLUMN}"
 _NARROWEST: Final = 60
-"""Least columns of lanes."""
+"""Columns of lanes, at least."""
 
 
 def drawing_lines(drawing: Drawing, width: int) -> list[Line]:
-    """Draw it, `width` columns wide, each mark as a character."""
+    """A drawing in characters, `width` columns wide."""
     lines: list[Line] = []
     for panel in drawing.panels:
         lines += [*([BLANK] if lines else []), *_panel(panel, width)]
@@ -95,7 +95,7 @@ def drawing_lines(drawing: Drawing, width: int) -> list[Line]:
 
 
 def _panel(panel: Panel, width: int) -> Iterator[Line]:
-    """A chart and its legend; bars that have a lane and a label each need none."""
+    """A chart and its legend. Bars with a lane and a label each need none."""
     match panel.plot:
         case ChartGrid():
             yield from (*_grid(panel.plot, width), BLANK)
@@ -109,7 +109,7 @@ def _panel(panel: Panel, width: int) -> Iterator[Line]:
 
 
 def _grid(grid: ChartGrid, width: int) -> Iterator[Line]:
-    """A row of marks for each row of cells, the last on top."""
+    """Marks of a grid, one line for each row of cells, the last row on top."""
     names, labels = ([tick.label for tick in ruler.ticks] for ruler in (grid.across, grid.up))
     gutter = 2 + max(map(len, labels))
     size = max(1, min(max(_BRACKETED, *(len(name) + 1 for name in names)), (width - gutter - 3) // len(names)))
@@ -131,7 +131,7 @@ def _grid(grid: ChartGrid, width: int) -> Iterator[Line]:
 
 
 def _tones(row: Sequence[ChartCell | None], *, start: int, size: int) -> Iterator[Mark]:
-    """Colours of runs of cells, on a terminal that has them."""
+    """Colours of runs of equal cells, for a terminal."""
     for tone, run in groupby("neutral" if cell is None else cell.tone for cell in row):
         end = start + size * len(list(run))
         if tone != "neutral":
@@ -140,7 +140,7 @@ def _tones(row: Sequence[ChartCell | None], *, start: int, size: int) -> Iterato
 
 
 def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
-    """A row for each lane; notes stand before the bars where these keep half of the width."""
+    """Lines of lanes; notes are before the bars if these keep half of the width."""
     labels = max(len(lane.label) for lane in lanes.lanes)
     notes = max(len(lane.note) for lane in lanes.lanes)
     gutter = labels + 2 + notes if notes and labels + notes + 5 <= width / 2 else labels
@@ -158,12 +158,12 @@ def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
 
 
 def _cells(lane: Lane, ruler: Ruler, columns: int) -> str:
-    """Fill each column with the mark that takes most of it, or a space."""
+    """Characters of a lane. Each column has the mark that takes most of it, or a space."""
     size = (ruler.high - ruler.low) / columns
     parts: list[dict[str, float]] = [{} for _ in range(columns)]
     for span in lane.spans:
         first, last = (min(columns - 1, max(0, int((end - ruler.low) / size))) for end in (span.start, span.end))
-        # An overlap that is only float rounding is none.
+        # An overlap of float rounding alone is none.
         least = min(size, span.end - span.start) * 1e-6
         for number in range(first, last + 1):
             start = ruler.low + number * size
@@ -174,16 +174,9 @@ def _cells(lane: Lane, ruler: Ruler, columns: int) -> str:
 
 
 def text(report: Report, *, width: int | None = None, styled: bool = False) -> str:
-    """Write an answer as lines of text.
+    """An answer as lines of text, `styled` in the colours of a terminal.
 
-    Parameters
-    ----------
-    report
-        The answer.
-    width
-        Width of the terminal, in columns; None without one: then no line is wrapped and no table narrowed.
-    styled
-        If True, write the colours of a terminal.
+    `width` is that of the terminal [columns]; for None, no line is wrapped and no table narrowed.
     """
     blocks = [*report.blocks]
     last = max((number for number, block in enumerate(blocks) if isinstance(block, Card)), default=None)
@@ -201,18 +194,10 @@ def text(report: Report, *, width: int | None = None, styled: bool = False) -> s
 def block_lines(
     blocks: Iterable[Block], *, width: int | None = None, is_whole: bool = False, whole_by: str = ""
 ) -> Iterator[Line]:
-    """Write blocks as lines, with blank lines around everything but sentences.
+    """Blocks as lines, with blank lines around everything but sentences.
 
-    Parameters
-    ----------
-    blocks
-        The blocks.
-    width
-        Width of the terminal, in columns; None without one.
-    is_whole
-        If True, tables leave nothing out.
-    whole_by
-        Says how the reader sees what a table leaves out.
+    `width` is that of the terminal [columns], None without one. Tables leave nothing out of a whole answer; `whole_by`
+    is the advice on seeing what they leave out of others.
     """
     before: Block | None = None
     for block in blocks:
@@ -259,7 +244,7 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
 
 
 def _drawn_lines(line: Line, width: int | None) -> list[Line]:
-    """A line of a drawing: words are wrapped, a label that reaches beyond the width is moved to the left."""
+    """Lines of a line in a drawing: words are wrapped, and a label beyond the width moves to the left."""
     if line.tone != "drawn":
         return wrapped(line, width)
     beyond = 0 if width is None else len(line.text) - width
@@ -272,11 +257,11 @@ def _caption(caption: Sentence | None, width: int | None) -> list[Line]:
 
 
 _INDENT: Final = " " * 5
-"""Before what is below the number of a step."""
+"""Indent of the lines below the number of a step."""
 
 
 def _step(number: int, step: CalculationStep, width: int | None) -> Iterator[Line]:
-    """A line in symbols, one in numbers and one with the result; empty ones are left out."""
+    """Lines of a step in symbols, in numbers and with the result; empty ones are left out."""
     head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
     result = with_unit(step.result) if isinstance(step.result, ShownValue) else step.result.text
     distinct = (text for text in (step.formula, step.numbers, result) if text)

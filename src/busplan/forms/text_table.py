@@ -1,4 +1,4 @@
-"""A table as lines of text, in the width of a terminal: no figure is cut."""
+"""A table as lines of text in the width of a terminal. No figure is cut."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby, zip_longest
@@ -12,35 +12,35 @@ from busplan.forms.numbers import cell_text, left_out_sentence
 _GAP: Final = 2
 """Blanks between two columns."""
 _LEAST_WORDS: Final = 24
-"""Narrowest column of wrapped words, unless a word is longer."""
+"""Width of the narrowest column of wrapped words, unless a word is longer."""
 _BROKEN_WORDS: Final = 16
-"""Narrowest column of broken words, as a last resort."""
+"""Width of the narrowest column of broken words, as a last resort."""
 _FAILS: Final = " !"
-"""After a figure that fails, for those who see no colours."""
+"""Mark after a figure that fails, for readers without colours."""
 _INDENT: Final = 4
-"""Blanks before what stands below its row."""
+"""Blanks before text below its row."""
 
 
 class _Column(NamedTuple):
     """A column as text."""
 
     number: int
-    """Its place in the table, from 0."""
+    """Index of the column in the table."""
     kind: TableColumn
     heads: tuple[str, ...]
     """Unit, heading and group, from the bottom."""
     cells: list[str]
     tones: list[Tone]
     natural: int
-    """Width of its widest cell or heading."""
+    """Width of the widest cell or heading."""
     least: int
     """Width below which a word, a figure or a heading would be broken."""
     broken: int
-    """Width as a last resort: words are broken, figures are not."""
+    """Width as a last resort, at which words are broken, but not figures."""
 
     @property
     def is_left(self) -> bool:
-        """Whether it is aligned to the left, as words are."""
+        """Whether the column is aligned to the left, as words are."""
         return self.kind.kind == "words"
 
 
@@ -53,18 +53,10 @@ class _Placed(NamedTuple):
 
 
 def table_lines(table: Table, *, width: int | None, is_whole: bool, whole_by: str) -> list[Line]:
-    """Lay out a table: words left, figures right, a rule below the headings, and below it what is left out.
+    """Lines of a table: words left, figures right, a rule below the headings, and remarks on what is left out.
 
-    Parameters
-    ----------
-    table
-        The table. Columns of drawings are left out: the figure is in another column.
-    width
-        Width of the terminal; None for any width.
-    is_whole
-        If True, no row and no column is left out.
-    whole_by
-        Words that tell the reader how to see what is left out.
+    Columns of drawings are left out: another column has the figure. `width` is that of the terminal, None for any; a
+    whole table leaves out no row and no other column, and `whole_by` is the advice on seeing one.
     """
     rows = [row for row in table.rows if is_whole or not row.is_detail]
     columns = [
@@ -93,7 +85,7 @@ def table_lines(table: Table, *, width: int | None, is_whole: bool, whole_by: st
 
 
 def _column(number: int, kind: TableColumn, rows: Sequence[TableRow]) -> _Column:
-    """The column as text; the first one is indented, and a figure that fails has its mark."""
+    """The column as text. The first one is indented, and a figure that fails has its mark."""
     heads = tuple(filter(None, (kind.unit, kind.heading, kind.group)))
     cells = [("  " * row.level if number == 0 else "") + _one_line(row.cells[number]) for row in rows]
     failing = [_is_failing_figure(row.cells[number]) for row in rows]
@@ -114,7 +106,7 @@ def _one_line(cell: Cell) -> str:
 
 
 def _is_failing_figure(cell: Cell) -> bool:
-    """Whether a cell is a figure that fails; words say so themselves."""
+    """Whether a cell is a figure that fails. Words that fail say so themselves."""
     return isinstance(cell, ShownValue) and cell.state == "fails" and not isinstance(cell.value, str)
 
 
@@ -125,7 +117,7 @@ def _tone(cell: Cell) -> Tone:
 def _arranged(
     columns: Sequence[_Column], width: int | None, *, is_whole: bool
 ) -> tuple[list[_Column], list[_Column], list[_Column]]:
-    """Columns that stand side by side, that stand below their row, and that are left out."""
+    """Columns side by side, columns below their row, and columns left out."""
     side, below, left_out = list(columns), list[_Column](), list[_Column]()
     ranked = [column for column in columns if column.kind.rank]
     for column in sorted(ranked, key=lambda column: (-column.kind.rank, -column.number)):
@@ -143,7 +135,7 @@ def _width(columns: Sequence[_Column]) -> int:
 
 
 def _panels(side: list[_Column], heads: int, width: int) -> list[list[_Column]]:
-    """Divide columns into panels that fit; columns of one group stay together where they can.
+    """Divide columns into panels that fit, with columns of one group together where possible.
 
     Words are broken before a table is divided.
     """
@@ -165,11 +157,11 @@ def _panels(side: list[_Column], heads: int, width: int) -> list[list[_Column]]:
 
 
 def _placed(columns: Sequence[_Column], width: int | None) -> Iterator[_Placed]:
-    """Columns with their widths; those that wrap share what is left."""
+    """Columns with their widths; those that wrap share the rest."""
     widths = {column.number: column.natural if width is None else column.least for column in columns}
     if width is not None:
         spare = width - _width(columns)
-        # Columns that need the least come first; what they do not need is left to the others.
+        # Columns with the smallest wants come first, and leave the rest to the others.
         wanting = sorted(columns, key=lambda column: column.natural - column.least)
         for place, column in enumerate(wanting):
             more = min(column.natural - column.least, max(spare, 0) // (len(wanting) - place))
@@ -187,7 +179,7 @@ def _placed(columns: Sequence[_Column], width: int | None) -> Iterator[_Placed]:
 
 
 def _heading(placed: Sequence[_Placed]) -> list[Line]:
-    """Heading lines from the top: group, heading and unit, aligned at the bottom; and a rule."""
+    """Heading lines from the top: group, heading and unit, aligned at the bottom, and a rule."""
     stacks = zip_longest(*(place.column.heads for place in placed), fillvalue="")
     lines = [Line(_laid(stack, placed), "heading") for stack in stacks]
     return [*lines[::-1], Line("-" * (placed[-1].start + placed[-1].width), "drawn")]
@@ -200,7 +192,7 @@ def _laid(cells: Sequence[str], placed: Sequence[_Placed]) -> str:
 
 
 def _row_lines(row: TableRow, at: int, placed: Sequence[_Placed]) -> Iterator[Line]:
-    """The row, in several lines if words of it are wrapped; a state is marked where it stands."""
+    """Lines of a row, several if words in it are wrapped; each state is marked."""
     pieces = [[line.text for line in _cell_lines(place.column.cells[at], place.width)] for place in placed]
     for cells in zip_longest(*pieces, fillvalue=""):
         marks = [

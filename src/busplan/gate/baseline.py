@@ -1,4 +1,4 @@
-"""The baseline: recorded axes and margins of each profile, and what a profile has lost since."""
+"""Baseline: recorded axes and margins of each profile, and losses of a profile against them."""
 
 import json
 import os
@@ -36,29 +36,29 @@ from busplan.sections.profile import Profile
 
 _SCHEMA: Final = 1
 MODELS: Final = 2
-"""Version of the timing models that the figures come from; figures of another version are not compared."""
+"""Version of the timing models behind the figures; figures of another version are not compared."""
 MAX_BASELINE_BYTES: Final = 32_000_000
-"""Enough for any repository at 200 bytes for each profile; a larger file is no baseline."""
+"""Size limit of a baseline [bytes]: enough for any repository at 200 bytes for each profile."""
 _REMEDY: Final = "remove it, and record one with --update-baseline"
-"""Remedy for a file that is not a baseline, which is never overwritten."""
+"""Remedy for a file that is no baseline, which is never overwritten."""
 
 _TEXT_KEYS: Final = ("schema_version", "name", "description")
-"""Keys of text, which no figure depends on; they are not recorded."""
+"""Text keys, which no figure depends on; they are not recorded."""
 
 
 class Record(NamedTuple):
     """A baseline's entry for one profile."""
 
     figures: Mapping[str, float]
-    """By name: "paper.max_axes"."""
+    """Figures by name, as "paper.max_axes"."""
     keys: Mapping[str, object] | None = None
-    """Values in the file, by dotted key; None in a baseline that does not record them."""
+    """Values in the file by dotted key; None in a baseline that does not record them."""
     findings: tuple[str, ...] = ()
-    """Findings that are known, as `known_as` names them: they count no more."""
+    """Known findings in the form of `known_as`; they no longer count."""
 
 
 def known_as(code: str, key: str) -> str:
-    """How a baseline names a finding: by its rule and its key, whatever the line."""
+    """Name of a finding in a baseline: its rule and its key, whatever the line."""
     return f"{code} {key}"
 
 
@@ -85,7 +85,7 @@ def keys_of(profile: Profile) -> dict[str, object]:
 
 
 def _loads(register: BusFigures) -> Iterable[Figure]:
-    """Figures of a kind of bus that are worse when larger, such as the load."""
+    """Figures of a kind of bus that are worse when larger, as the load."""
     return (figure for figure in register.compared if figure.better == "less")
 
 
@@ -94,7 +94,7 @@ _Scalar = bool | str | int | _Finite
 
 
 class _File(BaseModel, strict=True):
-    """A baseline as its file has it: figures, values of keys and findings of each profile."""
+    """File of a baseline: figures, values of keys and findings of each profile."""
 
     profiles: dict[str, dict[str, _Finite]]
     models: int = 1
@@ -106,25 +106,25 @@ class Baseline(NamedTuple):
     """A recorded baseline."""
 
     profiles: dict[str, Record]
-    """Records by the path of the profile, relative to the folder of the baseline's file; shipped profiles by name."""
+    """Records by path of the profile, relative to the folder of the baseline's file. Shipped profiles are named."""
     models: int
     """Version of the timing models."""
     path: Path | None = None
-    """Its file; without one, paths are relative to the working folder."""
+    """File of the baseline; without one, paths are relative to the working folder."""
 
     @property
     def is_current(self) -> bool:
-        """Whether its figures come from the present timing models, so that they can be compared."""
+        """Whether the figures come from the present timing models, so that they can be compared."""
         return self.models == MODELS
 
     def __str__(self) -> str:
         return "baseline" if self.path is None else str(self.path)
 
     def name_of(self, source: ProfileSource) -> str:
-        """Name of a profile's record, whatever the working folder is."""
+        """Name of a profile's record, whatever the working folder."""
         if source.is_shipped:
             return Path(source.name).stem
-        # Links to folders are resolved, a link that is the file itself is not. Standard input counts as the file that
+        # Links to folders are resolved; a link that is the file itself is not. Standard input counts as the file that
         # it is named after.
         path = Path(source.name)
         return Path(os.path.relpath(os.path.realpath(path.parent) / Path(path.name), self._folder)).as_posix()
@@ -134,19 +134,14 @@ class Baseline(NamedTuple):
         return Path.cwd() if self.path is None else Path(os.path.realpath(self.path)).parent
 
     def without_profile(self, checked: Iterable[str]) -> list[str]:
-        """Names of the records whose profile is gone; those of checked profiles are left out."""
+        """Names of records without a profile, apart from those of checked profiles."""
         left = self.profiles.keys() - set(checked) - set(shipped_names())
         return sorted(name for name in left if not (self._folder / name).is_file() or not claims(self._folder / name))
 
     def unmatched(self, profiles: Sequence[str], *, checked: Iterable[str]) -> str:
-        """Say which profiles have no record, and which records have no profile; empty where there is none.
+        """Message on profiles without a record and records without a profile; empty where there are none.
 
-        Parameters
-        ----------
-        profiles
-            Paths of the profiles without a record, as the message names them.
-        checked
-            Names of the records of checked profiles.
+        `profiles` are paths as the message names them; `checked` are the names of the checked profiles' records.
         """
         records = self.without_profile(checked)
         counts = (
@@ -163,10 +158,7 @@ class Baseline(NamedTuple):
 def load_baseline(path: Path) -> Baseline:
     """Read the file of a baseline.
 
-    Raises
-    ------
-    BusplanError
-        The file does not exist or cannot be read, or is no baseline of this version.
+    A file that is missing or unreadable, or no baseline of this version, raises BusplanError.
     """
     if not path.exists():
         raise BusplanError(f"{path}: no such file; record it with --update-baseline")
@@ -182,13 +174,7 @@ def load_baseline(path: Path) -> Baseline:
 
 
 def read_baseline(text: str, *, name: str) -> Baseline:
-    """Read a recorded baseline.
-
-    Raises
-    ------
-    BusplanError
-        It is not a baseline of this version.
-    """
+    """Read a recorded baseline; text that is none of this version raises BusplanError."""
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
@@ -223,11 +209,11 @@ def write_baseline(recorded: Mapping[str, Record]) -> str:
 _ROUNDING: Final = 1e-9
 """Relative tolerance for rounding by JSON or by another machine."""
 _MOST_NAMED: Final = 3
-"""Most keys that a finding names, and most files that a message does."""
+"""Keys that a finding names, and files that a message names, at most."""
 _LONGEST: Final = 30
-"""Longest value that a finding repeats in full."""
+"""Length up to which a finding repeats a value in full [characters]."""
 _MOST_FIGURES: Final = 3
-"""Most figures that a finding names; the diff of a new record shows all."""
+"""Figures that a finding names, at most; the diff of a new record shows all."""
 
 
 class ChangedValue(NamedTuple):
@@ -238,14 +224,9 @@ class ChangedValue(NamedTuple):
 
 
 def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
-    """Say what a profile lost against its record, at the first changed key that explains it, or at its name.
+    """Losses of a profile against its record, at the first changed key that explains them, or at its name.
 
-    Parameters
-    ----------
-    subject
-        The profile.
-    recorded
-        Its record. Without recorded keys, nothing can say which of them changed.
+    Without recorded keys, no change can explain them.
     """
     lost = worse(figures_of(subject), recorded.figures)
     if not lost:
@@ -260,7 +241,7 @@ def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
 
 
 def worse(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, tuple[float, float | None]]:
-    """Recorded figures that have become worse, each as it was and as it is; None if it no longer exists."""
+    """Recorded figures that have become worse, with the recorded and the present value, None if it no longer exists."""
     return {
         name: (value, now.get(name)) for name, value in before.items() if _is_worse(name, now.get(name), than=value)
     }
@@ -274,7 +255,7 @@ def _is_worse(name: str, value: float | None, *, than: float | None) -> bool:
 
 
 def _figure(name: str) -> Figure:
-    """The figure of a recorded name; if no bus has it any more, one that is labelled by its key."""
+    """Figure of a recorded name; one that no bus has any more is labelled by its key."""
     key = name.rpartition(".")[2]
     return _figures().get(key) or Figure(key, "", "", "", key.replace("_", " "))
 
@@ -287,14 +268,14 @@ def _figures() -> Mapping[str, Figure]:
 
 
 def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, ChangedValue]:
-    """Changed keys whose recorded value alone would win back some of what was lost; all of them if none would."""
+    """Changed keys whose recorded value alone would win back some of the loss; all changed keys if none would."""
     changed = _changed(subject, before)
     causes = {key: change for key, change in changed.items() if _wins_back(subject, key, change.before, lost)}
     return causes or changed
 
 
 def _changed(subject: Subject, before: Mapping[str, object]) -> dict[str, ChangedValue]:
-    """Keys whose value differs from the recorded one; a key that a file leaves out has its default."""
+    """Keys with another value than recorded; a key that a file leaves out has its default."""
     profile = subject.profile
     values = dict(flat(profile.model_dump(mode="json")))
     changed: dict[str, ChangedValue] = {}
@@ -306,17 +287,17 @@ def _changed(subject: Subject, before: Mapping[str, object]) -> dict[str, Change
 
 
 def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, object]) -> bool:
-    """Whether a profile with the recorded value of one key has more of what was lost."""
+    """Whether the recorded value of one key wins back some of the loss."""
     try:
         profile = override(subject.profile, {key: value})
-    except BusplanError:  # a value that goes with others, or a group that is gone
+    except BusplanError:  # The value depends on others, or its group is gone.
         return False
     now, then = figures_of(subject), figures_of(Subject(LoadedProfile(profile, subject.document)))
     return any(_is_worse(name, now.get(name), than=then.get(name)) for name in lost)
 
 
 def _keys(changes: Mapping[str, ChangedValue]) -> str:
-    """Say how keys changed; the first is not named, because the finding begins with it."""
+    """Words on changed keys; the first one has no name, because the finding begins with it."""
     first, *rest = (f"{_shown(value.now)}, was {_shown(value.before)}" for value in changes.values())
     named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], rest, strict=True)][: _MOST_NAMED - 1]
     more = len(changes) - 1 - len(named)
@@ -331,7 +312,7 @@ def _shown(value: object) -> str:
 
 
 def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> str:
-    """Say what became worse: the margin first, and the figures of the deciding timing model before those of others."""
+    """Words on worse figures: the margin first, and the deciding timing model before others."""
     order = list(_figures())
 
     def place(name: str) -> tuple[bool, int]:
@@ -344,7 +325,7 @@ def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> 
         figure, before = _figure(name), verb
         verb = " rose" if figure.better == "less" else " fell"
         by_model = "" if model == deciding else f" by the {model} timing"
-        # The verb is written once for figures in a row that share it.
+        # Figures in a row that share a verb have it once.
         phrases.append(
             f"{_label(path, figure)}{verb if verb != before else ''} {_change(figure, *lost[name])}{by_model}"
         )
@@ -354,7 +335,7 @@ def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> 
 
 
 def _label(path: str, figure: Figure) -> str:
-    """Name of a figure, and of its group."""
+    """Name of a figure and of its group."""
     section = path.rpartition(".")[0]
     return f"{figure.label} of {section.partition('.')[2]}" if section else figure.label
 

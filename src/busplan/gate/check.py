@@ -35,12 +35,12 @@ class CheckAnswer(Answer, CheckReport):
 
     @property
     def findings(self) -> tuple[Located, ...]:
-        """All findings by file and place, each with the `path` and the source line."""
+        """All findings by file and place, each with its `path` and source line."""
         return self.located
 
     @property
     def passed(self) -> bool:
-        """Whether every file could be checked and held against the baseline, and none has an error."""
+        """Whether every file could be checked and compared with the baseline, and none has an error."""
         return not self.failed and not self.has_findings("error")
 
     def report(self) -> Report:
@@ -49,7 +49,7 @@ class CheckAnswer(Answer, CheckReport):
 
     @property
     def headline(self) -> str:
-        """Number of profiles checked, and of their errors and warnings."""
+        """Number of checked profiles, and of their errors and warnings."""
         return sentence_text(summary_sentence(self))
 
     def _headline(self) -> str:
@@ -131,7 +131,7 @@ def check(
     (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0, suppressed=3))
     """
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
-    _ = changed.changed_constants  # refuses those that no kind of bus has, for all files at once
+    _ = changed.changed_constants  # Unknown constants are refused here, once for all files.
     recorded = None if baseline is None else _recorded(baseline)
     collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
     if recording is not None and len(collection.sources) + len(profiles) != 1:
@@ -153,11 +153,11 @@ def check(
     files: tuple[ProfileSource | Document, ...] = (*collection.sources, *in_memory)
     names = [_record_name(file, recorded) for file in files]
     records = [None if recorded is None else recorded.profiles.get(name) for name in names]
-    # Only this process can read standard input and what is in memory.
+    # Only this process can read standard input and profiles in memory.
     is_here = [executor is None or isinstance(file, Document) or str(file.path) == "-" for file in files]
     there = [pair for pair, here in zip(zip(files, records, strict=True), is_here, strict=True) if not here]
     checked = executor.map(check_file, *zip(*there, strict=True)) if executor is not None and there else iter(())
-    # What is in memory keeps the constants that were changed in it.
+    # A profile in memory keeps the constants that were changed in it.
     of_memory = dict(zip(map(id, in_memory), (profile.constants for profile in profiles), strict=True))
 
     def checked_here(file: ProfileSource | Document, record: Any) -> FileResult:
@@ -189,7 +189,7 @@ def _unmatched(recorded: Baseline, names: Sequence[str], results: Sequence[FileR
 
 
 def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool) -> tuple[Collection, list[Profile]]:
-    """Files of the arguments, and the profiles that are in memory."""
+    """Files of the arguments, and profiles in memory."""
     # A profile is iterable, too: over its sections.
     several = [paths] if isinstance(paths, str | os.PathLike | Profile) else items(paths, name="paths")
     profiles = [profile for profile in several if isinstance(profile, Profile)]

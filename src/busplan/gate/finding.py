@@ -39,12 +39,12 @@ class Finding(NamedTuple):
     rule: str
     severity: Severity
     message: str
-    """Problem and remedy, in one line."""
+    """Problem and remedy in one line."""
     key: str
     line: int
     column: int
     marked_column: int
-    """First column of the value, or of the name or comment that is marked instead."""
+    """First column of the mark: of the value, or of the name or comment in its place."""
     marked_end_column: int
     """First column after the mark."""
     problem: str
@@ -52,7 +52,7 @@ class Finding(NamedTuple):
     help: str | None = None
     """Remedy, in words."""
     cure: str | None = None
-    """Remedy, as lines of TOML: key = value."""
+    """Remedy as lines of TOML: key = value."""
 
 
 def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
@@ -61,7 +61,7 @@ def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
 
 
 def finding_line(path: str, finding: Finding) -> str:
-    """Write path:line:column: CODE severity: message."""
+    """The line path:line:column: CODE severity: message."""
     return printable(" ".join(finding_parts(path, finding)))
 
 
@@ -74,19 +74,7 @@ class Violation(NamedTuple):
 
 
 def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> Finding:
-    """Make the finding of a problem.
-
-    Parameters
-    ----------
-    rule
-        The rule that is broken.
-    problem
-        The problem, with its key and how it is mended.
-    spot
-        Its place.
-    words
-        What is wrong, with the key and the circumstances.
-    """
+    """Finding of a broken rule; `words` are the problem with its key and circumstances."""
     cure = f"cheapest cure: {', '.join(problem.cure)}" if problem.cure else ""
     message = "; ".join(filter(None, (words, problem.help, cure)))
     mending = problem.help or None, "\n".join(problem.cure) or None
@@ -94,16 +82,10 @@ def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> F
 
 
 class Subject:
-    """A profile with the figures that rules need, each computed once, at first use.
+    """A profile with the figures that rules need, each computed at its first use.
 
-    Parameters
-    ----------
-    loaded
-        The profile and its text.
-    changes
-        Changes already made to the profile, but not to its text.
-    circle_steps
-        Most simulated steps of each axis of its circle; None to run no circle.
+    `changes` are already made to the profile, but not to its text. `circle_steps` is the number of steps of each axis
+    above which its circle is not run; None runs no circle.
     """
 
     def __init__(
@@ -118,12 +100,12 @@ class Subject:
 
     @cached_property
     def deciding(self) -> FitFigures:
-        """The verdict, by the timing model that decides."""
+        """Verdict by the timing model that decides."""
         return figures(self.network, model=self.network.bus.deciding_model)
 
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
-        """The other timing models, each with whether the cycle fits, found without all their figures."""
+        """Other timing models, each with whether the cycle fits, found without all their figures."""
         given_us, bus = available_us(self.network), self.network.bus
         return tuple(
             (model, bool(fits_in(bus.cycle(self.network, model=model).required_us, available_us=given_us)))
@@ -132,21 +114,21 @@ class Subject:
         )
 
     def after(self, changes: Mapping[str, Value]) -> FitFigures:
-        """The verdict with other values by dotted key."""
+        """Verdict with other values by dotted key."""
         return figures(changed(self.network, changes), model=self.deciding.timing_model)
 
     def counts(self, changes: Mapping[str, Value] | None = None) -> tuple[GroupCapacity, ...]:
-        """How many nodes of each group, or of all, fit and are shown to fit, with other values by dotted key."""
+        """Numbers of nodes that fit and that are shown to fit, by group, with other values by dotted key."""
         network = changed(self.network, changes) if changes else self.network
         return node_counts(network, model=self.deciding.timing_model)
 
     def limit_words(self, key: str) -> str:
-        """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
+        """Excess over a limit of the bus in words, or the reason why it is not shown to be kept."""
         limit = self.network.bus.limit(key)
         return "" if limit is None else limit.words(self.network)
 
     def cure(self) -> Mending:
-        """The change after which the profile holds every constraint of a plan; one for all rules."""
+        """Change after which the profile holds every constraint of a plan; one for all rules."""
         return self._cure
 
     @cached_property
@@ -159,19 +141,14 @@ class Subject:
 
 
 MOST_STEPS: Final = 10_000_000
-"""Most steps of a circle that the gate runs: seconds, and a few hundred megabytes."""
+"""Steps of a circle that the gate runs, at most: some seconds, and a few hundred megabytes."""
 
 
 def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
-    """Run the circle test of a profile, and yield each broken rule with its problem.
+    """Run the circle test of a profile; yields each broken rule with its problem.
 
     A circle that cannot be run is a problem even if circles are not to be run. A cycle that does not fit has no circle;
-    another rule reports it.
-
-    Parameters
-    ----------
-    subject
-        The profile, and the most simulated steps of each axis: a longer circle is not run.
+    another rule reports it. A circle of more steps than the subject's `circle_steps` is not run.
     """
     profile, network, most_steps = subject.profile, subject.network, subject.circle_steps
     refused = refusals(network) if profile.asks_for_circle else ()
@@ -190,10 +167,10 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
     first = result.to_attack
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
     for failure in result.failures:
-        if failure.is_of_bus:  # another rule reports a cycle that is not shown to fit
+        if failure.is_of_bus:  # Another rule reports a cycle that is not shown to fit.
             continue
         is_stability = failure.name in STABILITY
-        # A finding needs a key in the file; a default limit is not in it.
+        # A finding needs a key in the file, where a default limit is not.
         is_set = failure.name in profile.tolerance.model_fields_set
         key = f"tolerance.{failure.name}" if is_set else "servo.position_gain_per_s"
         way_out = ""
@@ -205,15 +182,15 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
 
 
 def _refused(cause: Refused, profile: Profile) -> RuleProblem:
-    """Why a circle cannot be run, at a key of the file."""
+    """Reason why a circle cannot be run, at a key of the file."""
     key = _key_in_file(cause.name, *cause.beside, profile=profile)
-    # A finding begins with its key: then the message leaves the name out.
+    # A finding begins with its key, so the message leaves the name out.
     words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
     return RuleProblem(key, words, way_out)
 
 
 def _key_in_file(*keys: str, profile: Profile) -> str:
-    """The first of some keys that the profile sets; if it sets none, the section servo or circle."""
+    """First of some keys that the profile sets; without one, the section servo or circle."""
     for key in keys:
         section, _, name = key.rpartition(".")
         if name in value_at(profile, section).model_fields_set:
@@ -222,7 +199,7 @@ def _key_in_file(*keys: str, profile: Profile) -> str:
 
 
 def circle_rules_run(subject: Subject, problems: Iterable[tuple[Rule, RuleProblem]]) -> set[str]:
-    """Codes of the circle rules that were checked: all if the circle was run, else only the rule on why it was not."""
+    """Codes of the circle rules that were checked: all for a circle that was run, else the rule on why it was not."""
     not_run = {rule.code for rule, _ in problems if rule in (IMPOSSIBLE_CIRCLE, LONG_CIRCLE)}
     if not_run:
         return not_run
@@ -231,24 +208,22 @@ def circle_rules_run(subject: Subject, problems: Iterable[tuple[Rule, RuleProble
 
 
 _UNPLANNED: Final = "name"
-"""Key where a finding stands if no key plans its figure: every profile has a name."""
+"""Key of a finding whose figure no key plans: every profile has a name."""
 
 
 class Recording(NamedTuple):
-    """A recording of the machine that a profile describes."""
+    """A recording of the profile's machine."""
 
     path: FilePath
     quantile: float = 1.0
-    """Share of the events that a recorded worst case covers, 0.5..1."""
+    """Share of the events that a recorded worst case covers, 0.5..1 [1]."""
 
 
 def plan_problems(profile: Profile, recording: Recording) -> Iterator[tuple[Rule, RuleProblem]]:
-    """Compare a recording with the plan: what is outside it, what is not shown to be within, or why nothing is shown.
+    """Compare a recording with the plan.
 
-    Raises
-    ------
-    BusplanError
-        The recording cannot be read, or cannot be compared with the profile.
+    Yields figures outside the plan, those not shown to be within it, or the reason why nothing is shown. A recording
+    that cannot be read, or not be compared with the profile, raises BusplanError.
     """
     from busplan.questions.measured import measured
 

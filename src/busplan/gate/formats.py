@@ -1,4 +1,4 @@
-"""Formats of the gate's report; `busplan.gate.report`, which writes them, loads when a report is written."""
+"""Formats of the gate's report. `busplan.gate.report`, which writes them, loads only when needed."""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -9,12 +9,11 @@ class GateFormat(NamedTuple):
     """A format of the gate's report."""
 
     function: str
-    """Function of `busplan.gate.report`: a report to its text. That of a format for people takes the `width` of a
-    terminal, too."""
+    """Function of `busplan.gate.report` that turns a report into text; for people, at the `width` of a terminal."""
     reader: Literal["people", "programs", "builds"]
-    """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
+    """Readers of the format. Only a format for people takes the terminal's encoding; others are UTF-8."""
     repeats: bool = False
-    """If True, the concise lines go to standard error, too: GitHub shows ten annotations of a severity in a step."""
+    """Whether the concise lines go to standard error, too: GitHub shows ten annotations of a severity in a step."""
 
     @property
     def write(self) -> Callable[..., str]:
@@ -33,4 +32,4 @@ FORMATS: Final[dict[str, GateFormat]] = {
     "sarif": GateFormat("sarif", "builds"),
     "markdown": GateFormat("markdown_report", "builds"),
 }
-"""Every format by its name, in the order of the help."""
+"""Formats by name, in the order of the help."""

@@ -1,4 +1,4 @@
-"""Check documents against all rules, and leave out what their comments suppress."""
+"""Check of documents against all rules, except those that their comments suppress."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -43,17 +43,17 @@ _IGNORE_COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n
 
 
 class Suppression(NamedTuple):
-    """A comment that suppresses rules, and the line that it applies to."""
+    """A comment that suppresses rules, and its line."""
 
     codes: tuple[str, ...]
-    """Rule codes; empty if the comment is not understood."""
+    """Codes of rules; empty if the comment is not understood."""
     reason: str
     spot: Spot
     of_line: int
 
 
 def suppressions(document: Document) -> Iterator[Suppression]:
-    """Find the suppressions in a valid TOML text."""
+    """Suppressions in a valid TOML text."""
     if MARK not in document.text:
         return
     for offset in document.comments:
@@ -74,21 +74,10 @@ def suppressions(document: Document) -> Iterator[Suppression]:
 def suppress(
     violations: Iterable[Violation], document: Document, *, ran: set[str]
 ) -> tuple[list[Violation], list[tuple[Violation, str]], list[Finding]]:
-    """Tell suppressed problems apart, and find what is wrong with the suppressing comments themselves.
+    """Separate suppressed problems from others, and check the suppressing comments themselves.
 
-    Parameters
-    ----------
-    violations
-        All problems of the document.
-    document
-        The document.
-    ran
-        Codes of the rules that were checked; only for these can a suppression be without effect.
-
-    Returns
-    -------
-    tuple
-        Problems that are left, suppressed ones with the reason of their comment, and findings on comments.
+    A suppression can be without effect only for the rules that `ran`. Returns the problems that are left, the
+    suppressed ones with the reason in their comment, and findings on comments.
     """
     left = list(violations)
     suppressed: list[tuple[Violation, str]] = []
@@ -125,16 +114,16 @@ SuppressedBy = Literal["comment", "selection", "baseline"]
 
 
 class Fit(NamedTuple):
-    """How the cycle of a profile fits its slice, by the timing model that decides."""
+    """Fit of a profile's cycle in its slice, by the timing model that decides."""
 
     verdict: str | None = None
-    """fits, not shown to fit, or does not fit."""
+    """The verdict: fits, not shown to fit, or does not fit."""
     margin_corrected_us: float | None = None
     """Time left in the slice, corrected for the bias [us]."""
     uncertainty_us: float | None = None
     """Expanded uncertainty of the corrected margin [us]."""
     rests_on: tuple[RestsOn, ...] = ()
-    """What the profile does not give and the verdict takes for granted."""
+    """Assumptions of the verdict that the profile does not give."""
 
 
 class Suppressed(NamedTuple):
@@ -152,27 +141,27 @@ class FileResult(NamedTuple):
     profile: str | None
     """Name of the profile; None if it cannot be read."""
     findings: tuple[Finding, ...]
-    """Those that count, in the order of their places."""
+    """Findings that count, in the order of their places."""
     figures: dict[str, float]
     """Figures for a baseline; empty if the profile cannot be read or they were not requested."""
     source: tuple[str, ...] = ()
     """Source line of each finding."""
     failure: str | None = None
-    """Why the file could not be checked; None if it was checked."""
+    """Reason why the file could not be checked; None if it was."""
     keys: Mapping[str, object] | None = None
     """Keys for a baseline; None where `figures` is empty."""
     fit: Fit | None = None
-    """How the cycle fits; None if the profile cannot be read."""
+    """Fit of the cycle; None if the profile cannot be read."""
     circle_not_run: bool = False
-    """If True, the profile asks for a circle test, which the check left out."""
+    """Whether the profile asks for a circle test that the check left out."""
     suppressed: tuple[Suppressed, ...] = ()
     """Findings that a comment, the selection of rules or the baseline suppresses."""
     mended: tuple[str, ...] = ()
-    """Findings that the baseline knows, and that are no more."""
+    """Findings in the baseline that no longer exist."""
 
     @property
     def rests_on_words(self) -> str:
-        """What the verdict takes for granted, in words; empty if the profile gives all, or cannot be read."""
+        """Assumptions of the verdict in words; empty if the profile gives all, or cannot be read."""
         return "" if self.fit is None else ", ".join(dict.fromkeys(part.words for part in self.fit.rests_on))
 
     @property
@@ -186,16 +175,10 @@ class FileResult(NamedTuple):
 def check_source(
     source: ProfileSource | Document, recorded: Record | None = None, *, options: Mapping[str, Any]
 ) -> FileResult:
-    """Read one file, unless it is in memory, and check it against all rules.
+    """Read a file, unless it is in memory, and check it against all rules.
 
-    Parameters
-    ----------
-    source
-        The file; if it cannot be read, the result has a failure.
-    recorded
-        Its record in a baseline, or None.
-    options
-        Named arguments of `check_document`.
+    A file that cannot be read gives a result with a failure. `recorded` is its record in a baseline, or None; options
+    are arguments of `check_document`.
     """
     with constants_changed(options.get("changes", NO_CHANGES).changed_constants):
         return _check_source(source, recorded, options)
@@ -228,36 +211,16 @@ def check_document(
     recording: Recording | None = None,
     selection: Selection = EVERY_RULE,
 ) -> FileResult:
-    """Check one document against all rules.
+    """Check a document against all rules.
 
-    Parameters
-    ----------
-    document
-        The text and its name.
-    with_circle
-        Whether to run the circle test of profiles that ask for one.
-    circle_steps
-        Most simulated steps of each axis of a circle: a longer one is not run.
-    changes
-        Changes of the profile; if its schema refuses them, the result has a failure.
-    baseline
-        Record of the profile in a baseline, or None.
-    record
-        Whether to give the figures that a baseline records.
-    recording
-        Recording of its machine, or None; if it cannot be compared, the result has a failure.
-    selection
-        Rules that count.
-
-    Returns
-    -------
-    FileResult
-        Findings in the order of their places, and suppressed ones apart.
+    Circles run on `with_circle`, those of more than `circle_steps` steps never. Changes that the schema refuses give a
+    result with a failure, and so does a recording that cannot be compared. `baseline` is the profile's record; `record`
+    asks for the figures of a new one; the selection says which rules count.
     """
     try:
         profile = validate(document)
     except PlacedError as error:
-        # Comments do not suppress these: they prevent all other checks.
+        # Comments do not suppress these, because they prevent all other checks.
         return _result(document, None, list(_file_findings(error)))
     try:
         profile = changes.applied(profile)
@@ -281,7 +244,7 @@ def check_document(
     paths: dict[int, Any] = {}
     violations = [_placed(document, rule, problem, paths) for rule, problem in problems]
     if changes.entries:
-        # Comments were written for the file as it is; with changes, a suppression without effect is no fault.
+        # Comments are about the file as it is. With changes, a suppression without effect is no fault.
         ran = set()
     left, commented, of_comments = suppress(violations, document, ran=ran)
     found = [*(_finding_of(violation, subject) for violation in left), *of_comments]
@@ -308,7 +271,7 @@ def check_document(
 
 
 def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
-    """Make the result for a file that is not text."""
+    """Result for a file that is not text."""
     lines = content.decode("utf-8-sig", errors="replace").split("\n")
     findings = tuple(_file_findings(error))
     return FileResult(name, None, findings, {}, tuple(lines[finding.line - 1] for finding in findings))
@@ -325,7 +288,7 @@ def _file_findings(error: PlacedError) -> Iterator[Finding]:
 
 
 def _placed(document: Document, rule: Rule, problem: RuleProblem, paths: dict[int, Any]) -> Violation:
-    """Find the line of a problem's key, or of the table that should have it; `paths` are the `arrays` of `path_of`."""
+    """Place of a problem at its key, or at the table that should have it; `paths` are the `arrays` of `path_of`."""
     path = path_of(document.data(), problem.key, paths) if problem.key.count(".") > 1 else (*problem.key.split("."),)
     return Violation(rule, problem, document.spot(path))
 

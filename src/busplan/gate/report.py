@@ -1,4 +1,4 @@
-"""Reports of the gate: text, JSON, SARIF, JUnit, and what builds read."""
+"""Reports of the gate: text, JSON, SARIF, JUnit, and formats for builds."""
 
 import os
 import re
@@ -37,7 +37,7 @@ class Summary(NamedTuple):
 
 
 class Located(NamedTuple):
-    """A finding with its file, and a fingerprint that does not depend on lines and on other rules' findings."""
+    """A finding with its file, and a fingerprint independent of lines and of other rules' findings."""
 
     path: str
     finding: Finding
@@ -49,15 +49,15 @@ class CheckReport(NamedTuple):
     """Result of a run of the gate."""
 
     files: tuple[FileResult, ...]
-    """Each file with its `status`, its `findings` and, if it could not be checked, its `failure`."""
+    """Files, each with its `status`, its `findings` and, if it could not be checked, its `failure`."""
     changes: KeyChanges = NO_CHANGES
-    """What was changed in every file."""
+    """Changes made in every file."""
     others: int = 0
-    """Number of files that were skipped because they are no profiles."""
+    """Number of files skipped because they are no profiles."""
     unmatched: str = ""
-    """Which profiles have no record in the baseline, and which records no profile; empty where there is none."""
+    """Message on profiles without a record and records without a profile; empty where there are none."""
     lists_all: bool = False
-    """If True, people read each finding of a rule that is told once a run, too."""
+    """Whether people read every finding of a rule that is otherwise told once a run."""
 
     @property
     def summary(self) -> Summary:
@@ -90,7 +90,7 @@ class CheckReport(NamedTuple):
 
     @property
     def told(self) -> tuple[Located, ...]:
-        """Findings for people: of a rule that is told once a run, the first alone."""
+        """Findings for people; for a rule that is told once a run, only the first."""
         seen: set[str] = set()
         told = []
         for located in self.located:
@@ -107,7 +107,7 @@ def _fingerprint(path: str, finding: Finding, number: str) -> str:
 
 
 _TOLD_ONCE: Final = ("BP112",)
-"""Rules whose findings are alike in every profile."""
+"""Rules with the same finding in every profile."""
 
 
 def check_report(report: CheckReport) -> Report:
@@ -130,7 +130,7 @@ def _sentences(report: CheckReport) -> Iterator[Sentence]:
 
 
 def summary_sentence(report: CheckReport) -> Sentence:
-    """Say how many profiles were checked, and what was found."""
+    """Sentence with the number of profiles checked, and of what was found."""
     counts = report.summary
     failed = sum(file.failure is not None for file in report.files)
     checked = counts.files - failed
@@ -177,11 +177,11 @@ def check_document(report: CheckReport) -> JsonDocument:
 
 
 TONES: Final[dict[Severity, Tone]] = {"error": "fails", "warning": "warns"}
-"""Colour of each severity; a word says it, too."""
+"""Colour of each severity, in addition to its word."""
 
 
 def marked_line(text: str, path: str, finding: Finding) -> Line:
-    """Mark the place, the code and the severity of a line that begins with them."""
+    """A line with its place, code and severity marked, with which it begins."""
     place, words = finding_parts(path, finding)
     start = len(printable(place)) + 1
     severity = Mark(start, start + words.index(": "), TONES[finding.severity])
@@ -189,7 +189,7 @@ def marked_line(text: str, path: str, finding: Finding) -> Line:
 
 
 def concise(report: CheckReport, *, width: int | None = None) -> str:
-    """One line for each finding; in colours if there is a width, at which the terminal breaks the lines itself."""
+    """One line for each finding; in colours for a width, at which the terminal breaks the lines itself."""
     lines = [
         marked_line(finding_line(located.path, located.finding), located.path, located.finding)
         for located in report.told
@@ -198,16 +198,16 @@ def concise(report: CheckReport, *, width: int | None = None) -> str:
 
 
 WIDTH: Final = 100
-"""Widest line, in columns: of sentences, which are wrapped, and of source lines, which are cut."""
+"""Columns of the widest line: sentences are wrapped, and source lines cut."""
 _INDENT: Final = 4 * " "
 _CUT: Final = "..."
 _UNBROKEN: Final = "\xa0"
-"""A space at which no line ends; printable text has none."""
+"""Space at which no line ends; printable text has none."""
 _NUMBER_AND_WORD: Final = re.compile(r"(?<=[0-9]) (?=[a-z])")
 
 
 def full(report: CheckReport, *, width: int | None = None) -> str:
-    """Each finding with its line of the file; in colours if there is the width of a terminal, in columns."""
+    """Each finding with its line of the file; in colours for the width of a terminal, in columns."""
     return plain_text(_lines(report, WIDTH)) if width is None else styled_text(_lines(report, min(width, WIDTH)))
 
 
@@ -220,7 +220,7 @@ def _lines(report: CheckReport, width: int) -> Iterator[Line]:
 
 
 def _heading(located: Located, width: int) -> Iterator[Line]:
-    """Place, code and severity, which editors read, and the problem, wrapped."""
+    """Place, code and severity, which editors read, then the problem, wrapped."""
     place, words = finding_parts(located.path, located.finding)
     head = printable(f"{place} {words.removesuffix(located.finding.message)}")
     first, *rest = _wrapped(located.finding.problem, width, first=head)
@@ -250,7 +250,7 @@ def _mending(located: Located, width: int) -> Iterator[Line]:
 
 
 def _wrapped(text: str, width: int, *, first: str) -> list[str]:
-    """Break a sentence between words, but never between a number and its unit."""
+    """Lines of a sentence, broken between words but not between a number and its unit."""
     lines = wrap(
         _NUMBER_AND_WORD.sub(_UNBROKEN, printable(text)),
         width,
@@ -264,7 +264,7 @@ def _wrapped(text: str, width: int, *, first: str) -> list[str]:
 
 
 class _Shown(NamedTuple):
-    """A source line as shown: what is marked, and what stands around it."""
+    """A source line as shown, in three parts around the mark."""
 
     before: str
     marked: str
@@ -272,7 +272,7 @@ class _Shown(NamedTuple):
 
 
 def _shown(source: str, start: int, end: int, width: int) -> _Shown:
-    """Cut a source line around what is marked; tabs become spaces, so that the carets stand below it."""
+    """Cut a source line around its mark; tabs become spaces, so that the carets stand below the mark."""
     parts = source[:start], source[start:end], source[end:]
     before, marked, after = (
         printable(part, write=lambda character: _INDENT if character == "\t" else " ") for part in parts
@@ -290,7 +290,7 @@ def _shown(source: str, start: int, end: int, width: int) -> _Shown:
 
 
 def _columns(text: str) -> int:
-    """Columns that a text takes."""
+    """Width of a text in a terminal [columns]."""
     return sum(
         0 if category(character) in ("Mn", "Me") else 2 if east_asian_width(character) in "WF" else 1
         for character in text
@@ -381,7 +381,7 @@ def _result(located: Located) -> JsonDocument:
             }
         ],
         "partialFingerprints": {"busplanFinding/v1": located.fingerprint},
-        # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not have.
+        # SARIF's own fixes are edits of a file, but a cure may be a key that the file does not have.
         **({"properties": {"cure": finding.cure}} if finding.cure else {}),
     }
 
@@ -402,7 +402,10 @@ def _artifact(path: str) -> dict[str, str]:
 
 
 def github(report: CheckReport) -> str:
-    """One workflow command for each finding, which GitHub shows next to the line of the file, from the root."""
+    """Workflow commands, one for each finding.
+
+    GitHub shows it next to the line of the file, by its path from the root.
+    """
     lines = []
     paths = {file.path: _from_root(file.path) for file in report.files}
     for path, finding, _, _ in report.located:
@@ -420,7 +423,7 @@ def github(report: CheckReport) -> str:
 
 
 def _from_root(path: str) -> str:
-    """Path of a file from the root of its git working tree; as it is for no file, or outside of one."""
+    """Path of a file from the root of its git working tree; other paths stay as they are."""
     try:
         whole = Path(os.path.abspath(path))  # noqa: PTH100 - a link keeps its own name
         root = next(folder for folder in whole.parents if (folder / ".git").exists())
@@ -430,7 +433,7 @@ def _from_root(path: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Escape line ends as GitHub does; it has no escape for other control characters."""
+    """Escape line ends as GitHub does. It has no escape for other control characters."""
     return printable(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
 
 
@@ -438,7 +441,7 @@ _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ff
 
 
 def junit(report: CheckReport) -> str:
-    """One test case for each profile: errors are failures, files that could not be checked errors, warnings output."""
+    """Test cases by profile: errors are failures, files that could not be checked errors, warnings output."""
     failures = sum(any(finding.severity == "error" for finding in file.findings) for file in report.files)
     errors = sum(file.failure is not None for file in report.files)
     counts = {"tests": str(len(report.files)), "failures": str(failures), "errors": str(errors)}
@@ -472,7 +475,7 @@ def _fit_record(fit: Fit) -> dict[str, Any]:
 
 
 def markdown_report(report: CheckReport) -> str:
-    """A table of the profiles with their verdicts, and one of the findings; an empty one is left out."""
+    """Table of the profiles with their verdicts, and table of the findings; an empty one is left out."""
     sentences = (*changes_sentences(report.changes), summary_sentence(report))
     lines = ["### Check of profiles", "", escaped(" ".join(map(sentence_text, sentences)))]
     if report.files:

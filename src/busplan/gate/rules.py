@@ -1,4 +1,4 @@
-"""All rules of the gate by code, and the answer of `busplan rule`. A dropped code is never used again."""
+"""Rules of the gate by code, and the answer of `busplan rule`. A dropped code is never used again."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -78,7 +78,7 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _too_little_room(subject: RuleSubject, what: str) -> Iterator[RuleProblem]:
-    """The groups that have less room than [limits] asks for nodes or axes."""
+    """Groups with less room than [limits] asks for, in nodes or axes."""
     key = f"limits.min_spare_{what}"
     least = getattr(subject.profile.limits, f"min_spare_{what}")
     if least is None:
@@ -98,13 +98,13 @@ def _spare(counts: Any, spare: int, least: int) -> str:
 
 
 def _room(subject: RuleSubject, counts: Any) -> Mending:
-    """How to make room for more nodes."""
+    """Way to make room for more nodes."""
     limit = subject.network.bus.limit(counts.safe_limited_by)
     return subject.cure() if limit is None or limit.role == "safety" else Mending(limit.advice(subject.network))
 
 
 def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A node does not finish within the period, where the bus does not wait for it."""
+    """A node does not finish within the period, on a bus that does not wait for it."""
     deciding, network = subject.deciding, subject.network
     is_broken = NODE in deciding.exceeded
     if is_broken or NODE in (deciding.not_shown or ()):
@@ -133,7 +133,7 @@ CHECKS: Final[Mapping[str, Check]] = {
     "BP115": node_too_slow,
     "BP112": assumed_key,
 }
-"""The check of each rule, by its code in `rules.toml`."""
+"""Check of each rule, by its code in `rules.toml`."""
 
 
 COMMON: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in read_rules("busplan.gate", CHECKS)})
@@ -148,7 +148,7 @@ _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
     "execution-unknown": "BP007",
 }
 BY_PROBLEM: Final = {kind: COMMON[code] for kind, code in _FILE_CODES.items()}
-"""Rules of the file format, by the kind of problem that reading a profile finds."""
+"""Rules of the file format, by the kind of problem in a profile."""
 BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = map(COMMON.__getitem__, ("BP301", "BP901", "BP902"))
 CIRCLE = OF_CIRCLE, OF_STABILITY, IMPOSSIBLE_CIRCLE, LONG_CIRCLE = tuple(
     COMMON[code] for code in ("BP201", "BP202", "BP203", "BP204")
@@ -161,7 +161,7 @@ NEVER_SUPPRESSED: Final = frozenset((*_FILE_CODES.values(), "BP901", "BP902"))
 
 
 def all_rules() -> Mapping[str, Rule]:
-    """Every rule by code, including those of every kind of bus, sorted by code."""
+    """All rules by code, sorted, with those of every kind of bus."""
     return _by_code(tuple(map(kind_named, kind_names())))
 
 
@@ -172,7 +172,7 @@ def _by_code(kinds: tuple[Bus, ...]) -> Mapping[str, Rule]:
 
 
 def cycle_rules(kind: str) -> tuple[Rule, ...]:
-    """Rules on the cycle for profiles of a kind of bus, sorted by code."""
+    """Rules on the cycle of a kind of bus, sorted by code."""
     return tuple(sorted((*map(COMMON.__getitem__, CHECKS), *kind_named(kind).rules), key=lambda rule: rule.code))
 
 
@@ -183,17 +183,9 @@ _COLUMNS: Final = (
 
 
 def rule_answer(code: str | None = None) -> Report:
-    """Report of one rule, or of all.
+    """Report of one rule, by its code or its name in any case, or of all.
 
-    Parameters
-    ----------
-    code
-        Code or name of a rule, in letters of any case; None for all.
-
-    Raises
-    ------
-    BusplanError
-        No such rule.
+    An unknown rule raises BusplanError.
     """
     rules = all_rules()
     if code is None:
@@ -207,13 +199,13 @@ def rule_answer(code: str | None = None) -> Report:
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:
-    """Report of `rule` with one line for each rule."""
+    """Report of `rule`, with one line for each rule."""
     rows = (TableRow((Code(rule.code), rule.name, rule.severity, rule.summary)) for rule in rules)
     return _report(Sentence(("Rules of the gate",)), [Table(_COLUMNS, tuple(rows))], rules)
 
 
 def rule_report(rule: Rule) -> Report:
-    """Report of `rule CODE` with the explanation of one rule."""
+    """Report of `rule CODE`, with the explanation of one rule."""
     blocks: list[Block] = [
         Sentence((Code(rule.code), f" {rule.name} ({rule.severity}): {rule.summary}")),
         Sentence((rule.explanation,)),

@@ -1,4 +1,4 @@
-"""Which rules of the gate count where, and the settings of the nearest busplan.toml or pyproject.toml."""
+"""Selection of the gate's rules for each file, and settings of the nearest busplan.toml or pyproject.toml."""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,24 +18,16 @@ _PYPROJECT: Final = "pyproject.toml"
 
 
 class Selection(NamedTuple):
-    """Rules that count, by the beginning of their code: the longest that fits decides, and `ignore` in a tie."""
+    """Rules that count. The longest beginning of a code that fits decides; in a tie, `ignore` does."""
 
     select: tuple[str, ...] = ()
-    """Empty for all rules."""
+    """Beginnings of codes that count; empty for all rules."""
     ignore: tuple[str, ...] = ()
     per_file_ignores: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    """Beginnings of codes by the pattern of a path."""
+    """Beginnings of codes that do not count, by pattern of the path."""
 
     def reason(self, code: str, path: str) -> str:
-        """Why a finding does not count; empty where it does.
-
-        Parameters
-        ----------
-        code
-            Code of its rule.
-        path
-            The profile.
-        """
+        """Reason why a finding of a rule does not count for a profile; empty where it does."""
         if code in NEVER_SUPPRESSED:
             return ""
         chosen, ignored = (
@@ -57,7 +49,7 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _matches(path: str, pattern: str) -> bool:
-    """Whether a pattern is that of a path, or of its name alone, as in ruff."""
+    """Whether a pattern fits a path, or its name alone, as in ruff."""
     return fnmatch(_relative(Path(path), Path.cwd()), pattern) or fnmatch(PurePath(path).name, pattern)
 
 
@@ -65,13 +57,7 @@ EVERY_RULE: Final = Selection()
 
 
 def checked_codes(starts: Iterable[str], *, name: str) -> tuple[str, ...]:
-    """Beginnings of codes, each of some rule that can be ignored.
-
-    Raises
-    ------
-    BusplanError
-        No rule begins so, or all that do cannot be suppressed.
-    """
+    """Beginnings of codes. Each must fit a rule that can be suppressed, or BusplanError is raised."""
     codes = tuple(starts)
     for start in codes:
         rules = [code for code in all_rules() if code.startswith(start)] if start else []
@@ -84,21 +70,21 @@ def checked_codes(starts: Iterable[str], *, name: str) -> tuple[str, ...]:
 
 
 class Settings(NamedTuple):
-    """Settings of a file, by the name of their option."""
+    """Settings of a file by name of their option."""
 
     values: Mapping[str, Any]
     folder: Path
     """Folder of the file."""
 
     def option(self, name: str, given: Any, default: Any) -> Any:
-        """Value of an option: as given, or else that of the settings, or else the default; a path is made relative."""
+        """Value of an option as given, else from the settings, else the default. A path is made relative."""
         if given is not None or name not in self.values:
             return default if given is None else given
         value = self.values[name]
         if name == "baseline":
             return Path(self._path(value))
         if name == "per-file-ignores":
-            # A name alone is that of a file in any folder.
+            # A name alone stands for files in any folder.
             return {self._path(pattern) if "/" in pattern else pattern: codes for pattern, codes in value.items()}
         return value
 
@@ -110,7 +96,7 @@ _Codes = Annotated[list[str], Field(description='a list of rule codes or their b
 
 
 class _Table(BaseModel, strict=True, extra="forbid", alias_generator=lambda name: name.replace("_", "-")):
-    """Settings as a file has them, by the name of their option; a description says what is expected."""
+    """Settings of a file by name of their option; a description says which value is expected."""
 
     select: _Codes = []
     ignore: _Codes = []
@@ -127,16 +113,13 @@ class _Table(BaseModel, strict=True, extra="forbid", alias_generator=lambda name
 
 
 _EXPECTED: Final = {str(field.alias): field.description for field in _Table.model_fields.values()}
-"""What is expected of each key."""
+"""Expected value of each key, in words."""
 
 
 def nearest_settings(folder: Path) -> Settings:
-    """Settings of a folder or of the nearest one above it: of its busplan.toml, or else of its pyproject.toml.
+    """Settings of a folder or the nearest one above it: of busplan.toml, or else of pyproject.toml.
 
-    Raises
-    ------
-    BusplanError
-        The file is not TOML, or has an unknown key or a wrong value, with its place.
+    A file that is not TOML, an unknown key or a wrong value raises BusplanError, with its place.
     """
     for place in (folder, *folder.parents):
         for name, sections in ((SETTINGS_FILE, ()), (_PYPROJECT, ("tool", "busplan"))):

@@ -1,4 +1,4 @@
-"""Changes of a profile by options: `--set KEY=VALUE`, --period, and the goal of `plan`; and how to write them again."""
+"""Changes of a profile by options: `--set KEY=VALUE`, --period and the goal of `plan`; and how to write them again."""
 
 import os
 import re
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SET: Final = "--set"
 CONSTANTS: Final = "constants"
-"""Section of --set for constants of the model: constants.ARBITRATION_HOLD_US."""
+"""Section of --set for constants of the model, as in constants.ARBITRATION_HOLD_US."""
 _KEY: Final = re.compile(
     rf"[A-Za-z0-9_-]{{1,100}}(?:\.[A-Za-z0-9_-]{{1,100}}){{0,9}}|{CONSTANTS}\.[A-Za-z0-9_]{{1,100}}\[[A-Za-z0-9_-]{{1,100}}\]"
 )
@@ -31,12 +31,12 @@ UNITS: Final = {
     "m": {"mm": -3, "m": 0},
     "kbit_s": {"kbit/s": 0, "Mbit/s": 3},
 }
-"""Units that a value may be written in, by the unit at the end of its key: the power of ten of each."""
+"""Units in which a value may be written, as powers of ten, by the unit at the end of its key."""
 _WITH_UNIT: Final = re.compile(
     r"(?P<number>-?(?:[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+))\s*(?P<unit>[a-zA-Z][a-zA-Z/]*)"
 )
 _MOST_SHOWN: Final = 100
-"""Longest option repeated in full in a message."""
+"""Length up to which a message repeats an option in full [characters]."""
 
 
 class KeyChange(NamedTuple):
@@ -48,7 +48,7 @@ class KeyChange(NamedTuple):
     text: str = ""
     """Value of the option as typed."""
     note: str = ""
-    """The profile's value, if it is not what was typed: ", in us 500.0"."""
+    """The profile's value, where it differs from what was typed: ", in us 500.0"."""
 
     @property
     def typed(self) -> str:
@@ -64,17 +64,9 @@ class KeyChange(NamedTuple):
 
 @dataclass(frozen=True)
 class KeyChanges:
-    """Changes that are applied together; their order does not matter.
+    """Changes that are applied together, in any order.
 
-    Parameters
-    ----------
-    entries
-        The changes.
-
-    Raises
-    ------
-    BusplanError
-        Two of them set the same key, or one sets a key inside the table of another.
+    Two that set the same key, or a key and the table around it, raise BusplanError.
     """
 
     entries: tuple[KeyChange, ...] = ()
@@ -95,12 +87,9 @@ class KeyChanges:
 
     @property
     def changed_constants(self) -> "ChangedConstants":
-        """Other values of constants by name, those that were in force before included.
+        """Changed constants by name, those in force before included.
 
-        Raises
-        ------
-        BusplanError
-            No kind of bus has such a constant, or its value is no finite number.
+        An unknown constant, or a value that is no finite number, raises BusplanError.
         """
         from busplan.sourced import changed_constants  # noqa: PLC0415 - loads tomllib, which --help does not need
 
@@ -114,7 +103,7 @@ class KeyChanges:
 
     @property
     def by_set(self) -> tuple[KeyChange, ...]:
-        """Changes by --set; those by another option show in every answer."""
+        """Changes by --set. Every answer shows those by other options."""
         return tuple(change for change in self.entries if change.option == SET)
 
     @property
@@ -124,20 +113,17 @@ class KeyChanges:
 
     @property
     def of_profile(self) -> "KeyChanges":
-        """The changes of keys alone."""
+        """Changes of keys, without those of constants."""
         return KeyChanges(tuple(change for change in self.entries if change.sections[0] != CONSTANTS))
 
     def without(self, *, key: str) -> "KeyChanges":
-        """Leave out the change of a key."""
+        """Changes without that of a key."""
         return KeyChanges(tuple(change for change in self.entries if change.key != key))
 
     def applied(self, profile: "Profile") -> "Profile":
-        """Return the profile with all changes, validated once.
+        """The profile with all changes, validated once.
 
-        Raises
-        ------
-        BusplanError
-            The profile's schema refuses them; each problem names its option. Or its bus has no such constant.
+        A change that the schema refuses raises BusplanError, which names its option; so does an unknown constant.
         """
         from busplan.profile.document import override  # noqa: PLC0415 - loads pydantic, which --help does not need
 
@@ -152,21 +138,9 @@ NO_CHANGES: Final = KeyChanges()
 
 
 def require_separate(change: KeyChange, key: str, *, typed: str) -> None:
-    """Refuse to give a value to one key in two ways.
+    """Raise BusplanError if a change sets the key of another option, a section of it or one around it.
 
-    Parameters
-    ----------
-    change
-        A change.
-    key
-        Key that another option sets.
-    typed
-        The other option with its value.
-
-    Raises
-    ------
-    BusplanError
-        The keys are the same, or one is a section of the other.
+    `typed` is the other option with its value.
     """
     parts, other_parts = change.sections, tuple(key.split("."))
     shared = min(len(parts), len(other_parts))
@@ -178,12 +152,9 @@ def require_separate(change: KeyChange, key: str, *, typed: str) -> None:
 
 
 def parse_set(texts: Sequence[str]) -> tuple[KeyChange, ...]:
-    """Parse the values of --set, each KEY=VALUE.
+    """Changes of --set options, each KEY=VALUE.
 
-    Raises
-    ------
-    BusplanError
-        Not KEY=VALUE, or not a TOML value.
+    Another form, or a value that is not TOML, raises BusplanError.
 
     Examples
     --------
@@ -204,20 +175,15 @@ def _parsed(text: str) -> KeyChange:
             return KeyChange(key, value, text=f"{key}={written}", note=f", in {unit} {value:g}")
         if unit:
             raise BusplanError(f"{SET} {text}: expected a number in {listed([*UNITS[unit]], 'or')}")
-        # The schema says what is right: another key, or a number alone.
+        # The schema reports what would be right: another key, or a number alone.
         return KeyChange(key, written, text=f"{key}={written}")
     return KeyChange(key, _value(written, name=f"{SET} {text}"), text=f"{key}={written}")
 
 
 def in_unit(number: str, written: str, unit: str) -> float | None:
-    """Convert a number with its unit, exactly; None for a unit that is not one of the quantity.
+    """Convert a number, as typed, from its written unit to a key of `UNITS`.
 
-    Parameters
-    ----------
-    number, written
-        The number and its unit, as typed.
-    unit
-        Unit of the value, a key of `UNITS`.
+    The conversion is exact; a unit of another quantity gives None.
 
     Examples
     --------
@@ -232,7 +198,7 @@ def in_unit(number: str, written: str, unit: str) -> float | None:
 
 
 def _value(written: str, *, name: str) -> object:
-    """Read a TOML value; a bare word counts as text."""
+    """Parse a TOML value; a bare word is text."""
     from busplan.profile.document import Document  # noqa: PLC0415 - as above
 
     try:
@@ -258,7 +224,7 @@ def shell_word(text: str) -> str:
     ("'line 1.toml'", './-x.toml', '-')
     """
     if text.startswith("-") and text != "-":
-        # The program would take it for an option, whatever the quotes.
+        # Quotes do not stop a program from taking it for an option.
         text = f"./{text}"
     if not has_controls(text):
         return shlex.quote(text)
@@ -269,7 +235,7 @@ def shell_word(text: str) -> str:
 
 
 def period_option(period_us: float) -> tuple[str, str]:
-    """The --period option for exactly this period.
+    """The --period option that gives exactly this period.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Other values of constants of a kind of bus, as `constants.NAME` among the changes of a profile."""
+"""Changed constants of a kind of bus, named `constants.NAME` among the changes of a profile."""
 
 from collections.abc import Iterable, Mapping
 from math import isfinite
@@ -12,27 +12,16 @@ SECTION: Final = "constants"
 
 
 def is_constant(key: str) -> bool:
-    """Whether a key of changes is that of a constant."""
+    """Whether a key of changes names a constant."""
     return key.partition(".")[0] == SECTION
 
 
 def constants_of(changes: Mapping[str, object], kind: str | None, origin: Mapping[str, str]) -> dict[str, float]:
-    """The constants among some changes: values by name.
+    """Values of the constants among some changes, by name.
 
-    Parameters
-    ----------
-    changes
-        New values by dotted key; case does not count in names of constants.
-    kind
-        The kind of bus that has them; None where any kind may have them.
-    origin
-        What set a key, for messages, if it is not key and value.
-
-    Raises
-    ------
-    BusplanError
-        The kind has no such constant, or one that cannot be changed; its value is no finite number; or a constant is
-        named without `constants.`.
+    Case does not count in the names. A `kind` of None stands for every kind. `origin` says for messages what set a key,
+    if that is not key and value. BusplanError: the kind has no such constant, or a fixed one; the value is no finite
+    number; or `constants.` is missing before the name.
 
     Examples
     --------
@@ -60,7 +49,7 @@ def _known(kinds: Iterable[str]) -> dict[str, str]:
 
 
 def _name(written: str, kind: str | None, typed: str) -> str:
-    """Name of a constant, as its kind has it."""
+    """Name of a constant in its kind's own spelling."""
     every = _known(kind_names())
     name = every.get(written.upper())
     if name is None:

@@ -1,8 +1,8 @@
-"""The machine of a profile on another kind of bus: its bus section is that of a new profile of that kind.
+"""The machine of a profile on another kind of bus, with the bus section of a new profile of that kind.
 
-The machine is what profiles of every kind say: nodes, axes, payloads, execution times, the period, the share of it that
-is for communication, the servo and the circle; and its cables, by whatever key. What only its own kind has is left out,
-and what the other kind needs is assumed.
+The machine is what profiles of every kind have: nodes, axes, payloads, execution times, the period, the share of it for
+communication, the servo and the circle; also its cables, by whatever key. Keys of its own kind alone are left out, and
+those that only the new kind has are assumed.
 """
 
 import tomllib
@@ -20,7 +20,7 @@ from busplan.sections.profile import Profile
 _KIND, _NODES = "kind", "nodes"
 _SIZES = ("read_bytes", "write_bytes")
 _EVERY = "every"
-"""Rate of a group, on kinds that have several."""
+"""Rate of a group, on kinds with several rates."""
 
 
 class AssumedKey(NamedTuple):
@@ -29,8 +29,9 @@ class AssumedKey(NamedTuple):
     key: str
     value: Any
     source: Literal["new profile", "default", "setting", "profile"]
-    """Where its value comes from: what `init` writes, the default of the kind, a setting that the machine needs, or the
-    profile, which grades it assumed."""
+    """Source of the value: what `init` writes, the kind's default, a setting that the machine needs, or the profile,
+    which grades it assumed.
+    """
 
 
 class Conversion(NamedTuple):
@@ -38,29 +39,16 @@ class Conversion(NamedTuple):
 
     profile: Profile
     assumed: tuple[AssumedKey, ...]
-    """Keys of that kind; empty on the profile's own."""
+    """Keys of the new kind; empty on the profile's own."""
     left_out: tuple[str, ...]
-    """Keys and sections that the profile sets and the kind does not have."""
+    """Keys and sections of the profile that the kind does not have."""
 
 
 def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
-    """Put the machine of a profile on a kind of bus; on its own kind it stays as it is.
+    """Put the machine of a profile on a kind of bus; its own kind leaves it as it is.
 
-    Its execution times are as long there, which is assumed.
-
-    Parameters
-    ----------
-    profile
-        The profile.
-    kind
-        The kind of bus.
-    variant
-        Name of a variant of the kind; empty for the usual one.
-
-    Raises
-    ------
-    BusplanError
-        No profile of that kind can say this machine; each problem names its key.
+    Execution times stay equal, which is assumed. An empty variant is the usual one. A machine that no profile of the
+    kind can describe raises BusplanError; each problem names its key.
 
     Examples
     --------
@@ -78,7 +66,7 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
     machine, left_out = _common(data)
     left_out = _with_rates(machine, profile, left_out, kind=kind)
     _say_payloads(machine, profile)
-    # The host keeps its share of the period, whatever each kind has by default.
+    # The host keeps its share of the period, whatever the kind's default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
     bus = kind_named(kind)
     cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section(variant=variant))
@@ -91,10 +79,10 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
                 table[name] = max(cables_m.values())
     for nodes in (machine.get("node"), *machine.get("group", ())):
         if nodes and "execution" in nodes:
-            # Whoever measured it did so on the other bus.
+            # It was measured on the other bus.
             nodes["execution"]["grade"] = "assumed"
     raised, empty = _with_payloads(machine)
-    # Where both have a key, its value is that of the new bus.
+    # A key that both have takes the value of the new bus.
     merged = {**machine, **{name: {**machine.get(name, {}), **table} for name, table in new.items()}}
     new_profile = profile_of(merged)
     given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
@@ -102,7 +90,7 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
 
 
 def _with_rates(machine: TomlTable, profile: Profile, left_out: tuple[str, ...], *, kind: str) -> tuple[str, ...]:
-    """Keep the rates of groups on a kind that has such; returns what is left out without them."""
+    """Keep the rates of groups on a kind with rates; returns the keys left out without them."""
     (groups,) = models_of(kind_named(kind).profile_model().model_fields["group"].annotation)
     if _EVERY not in groups.model_fields:
         return left_out
@@ -122,7 +110,10 @@ def _say_payloads(machine: TomlTable, profile: Profile) -> None:
 
 
 def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
-    """Give nodes data in both directions; returns keys set for that, and groups left out without data, as couplers."""
+    """Give nodes data in both directions.
+
+    Returns the keys set for that, and the groups left out because they have no data, as couplers.
+    """
     groups: Sequence[TomlTable] = machine.get("group", ())
     empty = [group["name"] for group in groups if not any(group.get(key, 1) for key in _SIZES)]
     raised = []
@@ -137,7 +128,7 @@ def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
 
 
 def _cables_m(profile: Profile) -> dict[str, float]:
-    """Cable lengths that a profile sets, by key [m]; lengths of zero are left out."""
+    """Cable lengths of a profile by key [m], without zeros."""
     section, _, name = kind_named(profile.bus.kind).key_of("cable").partition(".")
     tables = [(f"bus.{name}", profile.bus)] if section == "bus" else []
     if section == "node":
@@ -150,7 +141,7 @@ def _cables_m(profile: Profile) -> dict[str, float]:
 
 
 def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
-    """Keys that profiles of every kind have; and names of the others, a section as a whole."""
+    """Keys that profiles of every kind have, and the names of the others; a section counts as a whole."""
     rest: list[str] = []
     common = _part(data, [Profile], "", rest)
     nodes = data["bus"].get(_NODES)
@@ -159,7 +150,7 @@ def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
 
 
 def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: str, rest: list[str]) -> TomlTable:
-    """Keys of a table that any of the models has; adds the others to the rest."""
+    """Keys of a table that any of the models has; the others go to the rest."""
     kept: TomlTable = {}
     for name, value in table.items():
         fields = [model.model_fields[name] for model in models if name in model.model_fields]
@@ -180,7 +171,7 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
 
 
 def _defaults(profile: Profile) -> Iterator[AssumedKey]:
-    """Keys that only the kind of a profile has, and that the profile leaves to their defaults."""
+    """Keys of the profile's own kind that it leaves to their defaults."""
     _, names = _common(profile.model_dump())
     for key, entry in dotted_keys(profile).items():
         is_own = any(key == name or key.startswith(f"{name}.") for name in names)

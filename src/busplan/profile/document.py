@@ -1,4 +1,4 @@
-"""The text of a profile, and the profile that it holds, validated; with changes, and with what its comments grade."""
+"""Text of a profile and the validated profile in it, with changes and with the grades in its comments."""
 
 import re
 import sys
@@ -39,12 +39,9 @@ _LONG_KEY: Final = (
 def text_of(content: bytes, *, name: str, wanted: str) -> str:
     """Decode a file, without its byte order mark.
 
-    Raises
-    ------
-    PlacedError
-        Not UTF-8, with the place and the expected content.
+    A file that is not UTF-8 raises PlacedError, with the place and the `wanted` content.
     """
-    # Remove the mark first: utf-8-sig would report offsets without it.
+    # Remove the mark first, because utf-8-sig would report offsets without it.
     content = content.removeprefix(BOM_UTF8)
     try:
         return content.decode()
@@ -56,18 +53,18 @@ def text_of(content: bytes, *, name: str, wanted: str) -> str:
 
 
 class Spot(NamedTuple):
-    """The line and column of a key, and the columns on that line of what is to be marked, all counted from 1."""
+    """Line and column of a key, and the columns to mark on that line, from 1."""
 
     line: int
     column: int
     marked_column: int
     marked_end_column: int
-    """The column after the last."""
+    """Column after the last marked one."""
 
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML text, whose lines end in LF, with its name in messages."""
+    """A TOML text with lines that end in LF, and its name in messages."""
 
     name: str
     text: str
@@ -79,17 +76,17 @@ class Document:
 
     @cached_property
     def places(self) -> dict[KeyPath, Place]:
-        """Place of every key; only for text that tomllib accepts."""
+        """Places of all keys; only for text that tomllib accepts."""
         return places(self.text)
 
     @cached_property
     def comments(self) -> list[int]:
-        """Offset of the hash of every comment; only for text that tomllib accepts."""
+        """Offsets of all comments, each at its hash; only for text that tomllib accepts."""
         return comments(self.text)
 
     @cached_property
     def comments_beside(self) -> dict[KeyPath, int]:
-        """Offset of the comment on the line of each key that has one there; that of a table is beside its header."""
+        """Offset of the comment on the line of each key, where there is one. A table's comment is beside its header."""
         line_of = self.lines.line_and_column
         of_line = {line_of(offset)[0]: offset for offset in self.comments}
         lines = {path: line_of(place.key_start)[0] for path, place in self.places.items()}
@@ -97,7 +94,7 @@ class Document:
 
     @cached_property
     def grades(self) -> dict[str, Grade]:
-        """Grades in comments, by dotted key; the grade of a table is for all its keys."""
+        """Grades in comments by dotted key; that of a table is for all its keys."""
         grades: dict[str, Grade] = {}
         names: dict[int, Any] = {}
         for path in self.places:
@@ -108,20 +105,15 @@ class Document:
         return grades
 
     def nearest(self, path: KeyPath) -> KeyPath:
-        """Path of a key; if it is missing, of the nearest table around it, () at the top."""
+        """Path of a key, or of the nearest table around a missing one; () at the top."""
         while path and path not in self.places:
             path = path[:-1]
         return path
 
     def spot(self, path: KeyPath, *, marks_key: bool = False) -> Spot:
-        """Place of a key with its value marked; if the key is missing, of the nearest table around it.
+        """Place of a key, with its value or the key itself marked.
 
-        Parameters
-        ----------
-        path
-            Path of the key.
-        marks_key
-            If True, mark the key instead of its value.
+        A missing key gets the place of the nearest table around it.
         """
         marked_path = self.nearest(path)
         if not marked_path:
@@ -130,32 +122,29 @@ class Document:
         marks_key = marks_key or marked_path != path
         start, end = (place.key_start, place.key_end) if marks_key else (place.value_start, place.value_end)
         line, column = self.lines.line_and_column(place.key_start)
-        # A value starts on the line of its key; one of several lines is marked on the first.
+        # A value starts on the line of its key, and only its first line is marked.
         marked = column + start - place.key_start
         return Spot(line, column, marked, marked + len(self.text[start:end].partition("\n")[0]))
 
     def syntax_error(self, offset: int, message: str) -> PlacedError:
-        """Make the error for invalid TOML at an offset."""
+        """Error for invalid TOML at an offset."""
         line, column = self.lines.line_and_column(offset)
         return PlacedError(self.name, (PlacedProblem(line, column, "syntax", message),))
 
     def data(self) -> TomlTable:
         """The parsed text, read once: copy it before a change.
 
-        Raises
-        ------
-        PlacedError
-            The text is not valid TOML, with the place of the error.
+        Invalid TOML raises PlacedError.
         """
         return self._data
 
     @cached_property
     def _data(self) -> TomlTable:
-        # A key is on one line, so count dots first: that is much faster than the search.
+        # A key is on one line, so dots are counted first: much faster than the search.
         may_be_long = any(line.count(".") >= _MAX_KEY_PARTS for line in self.text.split("\n"))
         if may_be_long and (long_key := re.search(_LONG_KEY, self.text)):
             raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
-        # Lines end in LF here: what is left of CR CR LF is no line end, and tomllib would take it for one.
+        # Lines end in LF here. What is left of CR CR LF is no line end, but tomllib would take it for one.
         if "\r\n" in self.text:
             raise self.syntax_error(self.text.index("\r\n"), "not valid TOML: illegal character '\\r'")
         try:
@@ -168,7 +157,7 @@ class Document:
 
     def _refusal(self, error: ValueError) -> PlacedError:
         match = re.match(_TOMLLIB_MESSAGE, str(error))
-        if match is None:  # the only error without a place: Python's limit of digits
+        if match is None:  # Python's limit of digits is the only error without a place.
             long_integer = re.search(_LONG_INTEGER, self.text)
             offset = long_integer.start() if long_integer else 0
             return self.syntax_error(offset, "not valid TOML: a number with too many digits")
@@ -189,11 +178,13 @@ def _first_deep_bracket(text: str) -> int:
 
 
 MAX_FILE_BYTES: Final = 2_000_000
-"""Largest profile: some 10,000 messages of a CAN network with their comments."""
+"""Size of the largest profile: some 10,000 messages of a CAN network, with their comments."""
 _KINDS: Final = ("bus", "bus.kind")
-"""Keys whose change may ask for tables of another kind of bus."""
+"""Keys whose change may require tables of another kind of bus."""
 _SOURCE: Final = "_source"
-"""Attribute of a profile that holds its document and the keys changed since; no field, so no part of its value."""
+"""Attribute of a profile for its document and the keys changed since. It is no field, so no part of the profile's
+value.
+"""
 
 
 class LoadedProfile(NamedTuple):
@@ -204,19 +195,9 @@ class LoadedProfile(NamedTuple):
 
 
 def decode(content: bytes, *, name: str) -> Document:
-    """Decode a file.
+    """Decode the file of a profile.
 
-    Parameters
-    ----------
-    content
-        The bytes; a byte order mark is skipped.
-    name
-        Name of the file in messages.
-
-    Raises
-    ------
-    PlacedError
-        Too large, or not UTF-8.
+    A file that is too large or not UTF-8 raises PlacedError.
     """
     if len(content) > MAX_FILE_BYTES:
         raise _machine_file(content, name) or too_large(name)
@@ -224,12 +205,12 @@ def decode(content: bytes, *, name: str) -> Document:
         text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
     except PlacedError as error:
         raise _machine_file(content, name) or error from None
-    # With LF only, offsets of the parser and the scanner agree.
+    # With LF alone, offsets of the parser and the scanner agree.
     return Document(name, text.replace("\r\n", "\n"))
 
 
 def _machine_file(content: bytes, name: str) -> PlacedError | None:
-    """The error for a file that is no profile, but that `import` makes one of; None for any other file."""
+    """Error for a file that is no profile but that `import` converts; None for any other file."""
     formats = matching(content)
     if len(formats) != 1:
         return None
@@ -238,27 +219,15 @@ def _machine_file(content: bytes, name: str) -> PlacedError | None:
 
 
 def too_large(name: str) -> PlacedError:
-    """Make the error for a file that is too large for a profile."""
+    """Error for a file that is too large for a profile."""
     message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; no profile is"
     return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 
 def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
-    """Read a file, or standard input for the path "-", up to one byte more than the limit.
+    """Read a file, or standard input for the path "-", up to one byte more than the limit [bytes].
 
-    Parameters
-    ----------
-    path
-        The file, or "-".
-    name
-        Name of the file in messages.
-    limit
-        Largest size [bytes]; by default that of a profile.
-
-    Raises
-    ------
-    BusplanError
-        It does not exist, is a directory, or cannot be read.
+    A file that is missing, a directory or unreadable raises BusplanError.
     """
     try:
         if str(path) == "-":
@@ -281,33 +250,22 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
 def validate(document: Document) -> Profile:
     """Validate a document against the profile's schema.
 
-    Raises
-    ------
-    PlacedError
-        Not TOML or not a profile; one message for each problem, in the order of their places.
+    Text that is no TOML or no profile raises PlacedError: one message for each problem, in the order of their places.
     """
     data = document.data()
     result = _checked(data)
     if isinstance(result, Profile):
         result.__dict__[_SOURCE] = document, frozenset()
         return result
-    from busplan.profile.problems import refusal  # loaded only for an invalid profile
+    from busplan.profile.problems import refusal  # Loaded only for an invalid profile.
 
     raise refusal(result, data, document)
 
 
 def profile_of(data: TomlTable) -> Profile:
-    """Validate plain data that stands in no file.
+    """Validate data that stand in no file; their kind of bus must be known.
 
-    Parameters
-    ----------
-    data
-        What a file would hold, with a kind of bus that is known.
-
-    Raises
-    ------
-    BusplanError
-        No profile of its kind; each problem names its key.
+    Data of no profile raise BusplanError; each problem names its key.
     """
     result = _checked(data)
     if isinstance(result, Profile):
@@ -318,7 +276,7 @@ def profile_of(data: TomlTable) -> Profile:
 
 
 def _checked(data: TomlTable) -> Profile | ValidationError | None:
-    """The profile of some data, or its error from pydantic; None if only the kind of bus is unknown."""
+    """Profile of some data, or pydantic's error; None if only the kind of bus is unknown."""
     kind = kind_of(data)
     try:
         valid = profile_model(kind).model_validate(data)
@@ -328,21 +286,11 @@ def _checked(data: TomlTable) -> Profile | ValidationError | None:
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
-    """Return a profile with new values, validated; keys that it does not set stay unset.
+    """The profile with new values, validated; keys that it does not set stay unset.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    changes
-        New value by dotted key: {"bus.nodes": 3}; or of a constant of its bus, as `constants.NAME`.
-    origin
-        What set a key, for messages, if it is not key and value: {"bus.nodes": "--nodes 3"}.
-
-    Raises
-    ------
-    BusplanError
-        A value that the profile's schema refuses.
+    Changes are by dotted key, {"bus.nodes": 3}, or by `constants.NAME` for a constant of its bus. `origin` says for
+    messages what set a key, if that is not key and value: {"bus.nodes": "--nodes 3"}. A value that the schema refuses
+    raises BusplanError.
     """
     if not changes:
         return profile
@@ -369,7 +317,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
 
 
 def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, object]:
-    """Arrays of tables that no change touches: there may be thousands of tables, which are valid as they are."""
+    """Arrays of tables that no change touches. They are valid as they are, and there may be thousands of tables."""
     if not changes.isdisjoint(_KINDS):
         return {}
     changed = {key.partition(".")[0] for key in changes}
@@ -378,22 +326,16 @@ def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, obj
 
 
 def has_comment_grades(profile: Profile) -> bool:
-    """Whether comments of its file may grade keys; one that was read from no file has no comments."""
+    """Whether comments of the profile's file may grade keys; False for one that was not read from a file."""
     document, _ = profile.__dict__.get(_SOURCE, (None, ()))
     return document is not None and GRADING.search(document.text) is not None
 
 
 def comment_grade(profile: Profile, key: str) -> Grade | None:
-    """The grade that a comment of its file, at the key or at its table, gives the value of a key.
+    """Grade that a comment of the file, at the key or at its table, gives the value of a dotted key.
 
-    Another value is not measured because the old one was; but an assumption that is made otherwise is still one.
-
-    Parameters
-    ----------
-    profile
-        The profile; one that was read from no file has no comments.
-    key
-        Dotted key.
+    A changed value is not measured because the old one was, but a changed assumption is still one. A profile that was
+    not read from a file has no comments.
     """
     document, changed = profile.__dict__.get(_SOURCE, (None, ()))
     if document is None:

@@ -1,9 +1,9 @@
-"""Change values in the text of a profile and keep everything else: bytes, comments and layout.
+"""Change values in the text of a profile and keep all other bytes, comments and layout.
 
 A value is replaced, or a line is added to or removed from a section. A layout that needs more is refused, with the
 lines to change by hand. As a check, the new text is parsed and compared with the wanted data. A comment that grades a
-value, as `# measured: by whom`, held for the old one: it becomes `# was measured: by whom`. But a choice is known no
-better than what was assumed before it: it stays assumed.
+value, as `# measured: by whom`, was about the old one: it becomes `# was measured: by whom`. A chosen value, however,
+is known no better than the assumption that it replaces, and stays assumed.
 """
 
 import json
@@ -37,12 +37,8 @@ from busplan.sections.profile import Profile
 def value_text(value: object) -> str:
     r"""Write a value as TOML, in one line without control characters.
 
-    Raises
-    ------
-    TypeError
-        Not a bool, a number, a str, or a sequence or table of them.
-    ValueError
-        A number is not finite.
+    A number that is not finite raises ValueError. A value that is no bool, number or str, nor a sequence or table of
+    them, raises TypeError.
 
     Examples
     --------
@@ -58,7 +54,7 @@ def value_text(value: object) -> str:
             raise ValueError(f"{value} is not finite")
         return repr(float(value))
     if isinstance(value, str):
-        # TOML has JSON's escapes; for other characters that are not printable, it needs \U.
+        # TOML has JSON's escapes; other characters that are not printable need \U.
         return printable(json.dumps(value, ensure_ascii=False), write=lambda character: f"\\U{ord(character):08x}")
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{key} = {value_text(inner)}' for key, inner in value.items())}}}"
@@ -68,7 +64,7 @@ def value_text(value: object) -> str:
 
 
 def whole(value: Any) -> Any:
-    """A whole float as an integer, and any other value as it is: where the schema has a float, both mean the same."""
+    """A whole float as an integer, any other value as it is. Where the schema has a float, both mean the same."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -84,17 +80,9 @@ def short_text(value: object) -> str:
 
 
 def profile_text(profile: Profile) -> str:
-    """Write a profile as TOML, without keys that it does not set; grades that comments gave are comments again.
+    """Write a profile as TOML, without keys that it does not set.
 
-    Parameters
-    ----------
-    profile
-        Any profile.
-
-    Returns
-    -------
-    str
-        TOML that parses to the same profile, without other comments; `profile.edit` keeps those of a file.
+    Grades that comments gave are comments again; `profile.edit` keeps the other comments of a file, too.
 
     Examples
     --------
@@ -108,7 +96,7 @@ def profile_text(profile: Profile) -> str:
 
 
 def _graded(text: str, profile: Profile) -> str:
-    """The text with the grade of each key that a comment of the profile's file grades."""
+    """The text with a comment for each key that a comment of the profile's file grades."""
     if not has_comment_grades(profile):
         return text
     document = Document("", text)
@@ -116,7 +104,7 @@ def _graded(text: str, profile: Profile) -> str:
     lines = text.split("\n")
     for path, place in document.places.items():
         grade = comment_grade(profile, ".".join(map(str, named_path(document.data(), path, names))))
-        # A string of several lines has no room beside its key, and is no value that has a grade.
+        # A string of several lines has no room beside its key, and no grade.
         if grade is not None and place.value_start > place.key_end and not text.startswith('"""', place.value_start):
             lines[document.lines.line_and_column(place.key_start)[0] - 1] += f"  # {grade}"
     return "\n".join(lines)
@@ -139,36 +127,19 @@ def edited_file(
     notes: Mapping[str, str] | None = None,
     are_choices: bool = False,
 ) -> bytes:
-    r"""Return a profile's file with new values; a byte order mark and CRLF line ends are kept.
+    r"""The file of a profile with new values; a byte order mark and CRLF line ends are kept.
 
-    Parameters
-    ----------
-    content
-        The file, a valid profile.
-    changes
-        New value by dotted key, None to remove the key: {"bus.nodes": 3, "bus.max_hops": None}. A value is a bool, an
-        int, a float, a str, or a sequence of them; an equal value keeps its text. A new key is added after the last one
-        of its section, a new section at the end.
-    name
-        Name of the file in messages.
-    notes
-        One-line comment by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It says where
-        the section's values are from, and replaces a comment there with the same beginning, up to the colon.
-    are_choices
-        Whether the values are chosen, as those of a plan, and not measured or read: then what was assumed stays
-        assumed, and nothing is measured by the comment of its section.
+    Changes are by dotted key, None to remove it: {"bus.nodes": 3, "bus.max_hops": None}. A value is a bool, an int, a
+    float, a str, or a sequence of them; an equal value keeps its text. A new key follows the last one of its section; a
+    new section stands at the end.
 
-    Returns
-    -------
-    bytes
-        The new file, a valid profile with exactly the wanted data.
+    Notes are one-line comments by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. A note
+    says where the section's values are from, and replaces a comment with the same beginning, up to the colon.
+    `are_choices` says that the values are chosen, as by a plan, not measured or read: assumptions stay assumed, and the
+    section's comment makes nothing measured.
 
-    Raises
-    ------
-    BusplanError
-        The new profile is not valid; or the layout does not allow the changes, with the lines to change by hand.
-    TypeError
-        TOML has no such value.
+    A new profile that is not valid raises BusplanError, and so does a layout that does not allow the changes, with the
+    lines to change by hand. A value that TOML does not have raises TypeError.
 
     Examples
     --------
@@ -195,7 +166,7 @@ def edited_file(
     after = _texts(data)
     # Set keys before removing keys: new lines must not follow the comment of a removed line.
     changed = {key: after.get(key) for key in {**after, **before} if after.get(key) != before.get(key)}
-    # A note speaks of its whole section, of values that stay equal, too.
+    # A note is about its whole section, equal values included.
     noted = {path_of(data, key) for key in (*notes, *changes) if key in notes or key.rpartition(".")[0] in notes}
     document = _with_old_grades(document, noted | {path_of(data, key) for key in changed}, are_choices=are_choices)
     try:
@@ -209,16 +180,10 @@ def edited_file(
 
 
 def edited_copy(loaded: LoadedProfile, choices: Mapping[str, object]) -> bytes:
-    """Return a copy of a profile with chosen values, for another file; grades that comments give are kept.
+    """Copy of a profile with chosen values, for another file; choices are as the changes of `edited_file`.
 
-    So are all comments and the layout, unless the layout does not allow the changes.
-
-    Parameters
-    ----------
-    loaded
-        The profile and its text.
-    choices
-        New value by dotted key, as for `edited_file`.
+    Comments with grades are kept. So are all other comments and the layout, unless the layout does not allow the
+    changes.
     """
     try:
         return edited_file(loaded.document.text.encode(), choices, name=loaded.document.name, are_choices=True)
@@ -227,7 +192,7 @@ def edited_copy(loaded: LoadedProfile, choices: Mapping[str, object]) -> bytes:
 
 
 def _texts(data: Mapping[str, Any]) -> dict[str, str]:
-    """Every value as text, so that equal values have equal types."""
+    """Values as texts, so that equal texts have equal types."""
     return {key: value_text(value) for key, value in flat(data)}
 
 
@@ -247,7 +212,7 @@ def _encoded(text: str, *, like: bytes) -> bytes:
 
 
 def _by_hand(changed: Mapping[str, str | None], notes: Mapping[str, str]) -> Iterator[str]:
-    """Lines to copy for the changes; keys outside sections come first."""
+    """Lines to copy for the changes, keys outside sections first."""
     sections = dict.fromkeys([*sorted(key.rpartition(".")[0] for key in changed), *notes])
     for section in sections:
         if section in notes:
@@ -261,7 +226,7 @@ def _by_hand(changed: Mapping[str, str | None], notes: Mapping[str, str]) -> Ite
 
 
 def _header_text(section: str) -> str:
-    """Header of a section; in that of a group its place says which one it is."""
+    """Header of a section; for a section of a group, with the group's name."""
     parts = section.split(".")
     if parts[0] != "group" or len(parts) == 1:
         return f"[{section}]"
@@ -314,14 +279,14 @@ def _with_line(document: Document, path: KeyPath, value: str) -> str:
             raise _LayoutError("there is no section of a group to write to")
         return f"{_whole_lines(text)}\n[{'.'.join(map(str, table))}]\n{line}"
     lines = [place for key, place in document.places.items() if key[:-1] == table and place.value_start > place.key_end]
-    header = [_header(document, table)] if table else []  # every profile has keys above its sections
+    header = [_header(document, table)] if table else []  # Every profile has keys above its sections.
     last = max(header + lines, key=lambda place: place.value_end)
     start, end = _line_start(text, last.key_start), _line_end(text, last.value_end)
     return f"{_whole_lines(text[:end])}{_indent(text, start)}{line}{text[end:]}"
 
 
 def _without(document: Document, path: KeyPath) -> str:
-    """Remove the lines of a key; their comments get lines of their own."""
+    """Remove the lines of a key; comments on them get lines of their own."""
     text, place = document.text, document.places[path]
     start, end = _line_start(text, place.key_start), _line_end(text, place.value_end)
     if text[start : place.key_start].strip():
@@ -331,7 +296,7 @@ def _without(document: Document, path: KeyPath) -> str:
 
 
 def _with_old_grades(document: Document, paths: set[KeyPath], *, are_choices: bool) -> Document:
-    """The document with "was" in the comments that grade some keys, but for choices instead of what was assumed."""
+    """The document with "was" in the comments that grade some keys. For choices, comments that say assumed stay."""
     text, beside = document.text, document.comments_beside
     for at in sorted({beside[path] for path in paths & set(beside)}, reverse=True):
         match = GRADING.match(text, at)
@@ -341,7 +306,7 @@ def _with_old_grades(document: Document, paths: set[KeyPath], *, are_choices: bo
 
 
 def _without_grade_of_table(document: Document, path: KeyPath) -> Document:
-    """The document with a comment beside a chosen key, where that of its table would call it measured or published."""
+    """The document with a comment beside a chosen key whose table's comment would call it measured or published."""
     text, beside = document.text, document.comments_beside
     at = None if path in beside else beside.get(path[:-1])
     match = None if at is None else GRADING.match(text, at)
@@ -352,7 +317,7 @@ def _without_grade_of_table(document: Document, path: KeyPath) -> Document:
 
 
 def _noted(document: Document, table: KeyPath, note: str) -> str:
-    """Add a comment above the other comments of a section, so that a suppression stays next to its line."""
+    """Add a comment above the other comments of a section. A suppression stays next to its line."""
     text = document.text
     top = _line_start(text, _header(document, table).key_start)
     line = f"{_indent(text, top)}# {printable(note)}\n"

@@ -16,11 +16,11 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 from busplan.sourced import Sourced
 
 _Arrays: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
-"""Tables of arrays by name, and their names, by the identity of the array: there may be thousands to look up in."""
+"""Tables of arrays by name, and the names, by identity of the array. They make look-ups among thousands fast."""
 
 
 def default_of(profile: Profile, key: str) -> object:
-    """Default value of a key that a profile has, as plain data; None if it has none.
+    """Default of a key of a profile, as plain data; None if it has none.
 
     Examples
     --------
@@ -41,22 +41,14 @@ class KeyValue(NamedTuple):
     """The value of one key."""
 
     value: object
-    """None if the key has neither a value nor a default."""
+    """Value of the key, or its default; None if it has neither."""
     source: Literal["file", "default"]
 
 
 def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
-    """List all keys of a profile, including those with default values; none of a cycle where there is none.
+    """Values of all keys of a profile, defaults included, by dotted key in the order of the schema.
 
-    Parameters
-    ----------
-    profile
-        Any profile.
-
-    Returns
-    -------
-    dict
-        Values by dotted key, in the order of the schema.
+    A network without a cycle has no keys of one.
 
     Examples
     --------
@@ -106,14 +98,7 @@ def named_tables(value: object) -> dict[str, dict[str, Any]] | None:
 def path_of(data: Mapping[str, object], key: str, arrays: _Arrays | None = None) -> tuple[str | int, ...]:
     """Path of a dotted key, with the index of a table in its array instead of its name.
 
-    Parameters
-    ----------
-    data
-        The tables.
-    key
-        The key.
-    arrays
-        Remembers arrays from one key of `data` to the next.
+    `arrays` keeps look-ups of arrays from one key of `data` to the next.
 
     Examples
     --------
@@ -124,16 +109,9 @@ def path_of(data: Mapping[str, object], key: str, arrays: _Arrays | None = None)
 
 
 def named_path(data: object, path: tuple[str | int, ...], arrays: _Arrays | None = None) -> tuple[str | int, ...]:
-    """The path with the names of tables in arrays instead of their indexes, where they have names.
+    """The path with the names of tables in arrays, where they have names, instead of their indexes.
 
-    Parameters
-    ----------
-    data
-        The tables.
-    path
-        The path.
-    arrays
-        Remembers arrays from one path of `data` to the next.
+    `arrays` keeps look-ups of arrays from one path of `data` to the next.
     """
     return tuple(name for _, name in _steps(data, path, arrays))
 
@@ -141,7 +119,10 @@ def named_path(data: object, path: tuple[str | int, ...], arrays: _Arrays | None
 def _steps(
     data: object, path: Iterable[str | int], arrays: _Arrays | None = None
 ) -> Iterator[tuple[str | int, str | int]]:
-    """Each part of a path; that of a table in an array as its index and as its name, whichever the path has."""
+    """Parts of a path, each in two forms that differ for a table in an array: index and name.
+
+    The path may have either.
+    """
     arrays = {} if arrays is None else arrays
     for part in path:
         if id(data) not in arrays:
@@ -158,21 +139,10 @@ def _steps(
 
 
 def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[dict[str, Any], str]:
-    """Find the table of a dotted key, created if it is missing, and the name of the key in it.
+    """Table of a dotted key, created if it is missing, and the name of the key in it.
 
-    Parameters
-    ----------
-    data
-        The tables.
-    key
-        The dotted key.
-    name
-        What messages call the key; by default the key.
-
-    Raises
-    ------
-    BusplanError
-        A part of the key is a value, or there is no table of that name.
+    `name` is the key's name in messages; None for the key itself. BusplanError: a part of the key is a value, or there
+    is no table of that name.
     """
     *sections, last = key.split(".")
     table: object = data
@@ -199,17 +169,17 @@ def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[
 _NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
 """Sections whose common keys no cycle depends on; a cycle may depend on keys that a kind of bus adds to them."""
 _OF_VERDICT: Final = ("limits.reserve",)
-"""Keys of these sections that a verdict depends on."""
+"""Keys of these sections on which a verdict depends."""
 _OF_GROUP: Final = ("name", "execution.kind")
-"""Keys of a group that say how the others are read."""
+"""Keys of a group that determine how its other keys are read."""
 _CHANGE_NO_FIGURE: Final = ("bus.kind", "node.execution.kind")
-"""Keys that say how the others are read."""
+"""Keys that determine how others are read."""
 _OF_CYCLE: Final = ("cycle.", "node.", "payload.", "bus.nodes", *_OF_VERDICT)
-"""Beginnings of keys that no figure of a network without a cycle depends on."""
+"""Beginnings of keys that do not matter to a network without a cycle."""
 
 
 def kind_of(data: Mapping[str, object]) -> str | None:
-    """The kind of bus in a profile's data; None if it is missing or unknown."""
+    """Kind of bus in a profile's data; None if it is missing or unknown."""
     section = data.get("bus")
     kind = section.get("kind") if isinstance(section, Mapping) else None
     return kind if isinstance(kind, str) and kind in kind_names() else None
@@ -248,14 +218,7 @@ def models_of(annotation: Any) -> list[type[BaseModel]]:
 def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefix: str = "") -> Iterator[str]:
     """Dotted keys of a model whose value is a number, a word or a boolean, in the order of the schema.
 
-    Parameters
-    ----------
-    model
-        The model.
-    names
-        Names of the tables that a profile has of a key with several.
-    prefix
-        What stands before each key.
+    `names` has the names of a profile's tables, for keys with several; `prefix` stands before each key.
     """
     for name, field in model.model_fields.items():
         inner = models_of(field.annotation)
@@ -267,7 +230,7 @@ def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefi
 
 
 def cycle_keys(profile: Profile) -> tuple[str, ...]:
-    """Keys of a profile that its cycle, or its verdict, may depend on."""
+    """Keys of a profile on which its cycle or its verdict may depend."""
     model = profile_model(profile.bus.kind)
     several = [name for name, field in model.model_fields.items() if _are_several(field.annotation)]
     tables = tuple((name, tuple(table.name for table in getattr(profile, name))) for name in several)
@@ -288,7 +251,7 @@ def _cycle_keys(model: type[Profile], several: tuple[tuple[str, tuple[str, ...]]
 
 
 def words_of(profile: Profile, key: str) -> tuple[str, ...]:
-    """Words that a key of a profile may have as its value; for a boolean, true and false."""
+    """Words allowed as the value of a key of a profile; true and false for a boolean."""
     path = tuple(part for place, part in enumerate(key.split(".")) if not (place == 1 and key.startswith("group.")))
     fields = _fields(profile_model(profile.bus.kind), path)
     return tuple(dict.fromkeys(text for field in fields for text in _words(field.annotation)))
@@ -327,12 +290,7 @@ _SCHEMA_ID: Final = "https://json.schemastore.org/busplan.json"
 
 
 def profile_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a profile, draft 2020-12, made by pydantic.
-
-    Returns
-    -------
-    dict
-        The schema; `bus.kind` selects that of a kind of bus.
+    """JSON Schema of a profile, draft 2020-12, made by pydantic; `bus.kind` selects the schema of a kind of bus.
 
     Examples
     --------
@@ -343,7 +301,7 @@ def profile_schema() -> dict[str, Any]:
 
     class WithConstants(GenerateJsonSchema):
         def get_default_value(self, schema: Any) -> Any:
-            """The default of a key, also where it is a constant."""
+            """Default of a key, also where it is a constant."""
             has_one = "default_factory" in schema and not schema.get("default_factory_takes_data")
             made = schema["default_factory"]() if has_one else None
             if isinstance(made, Sourced):

@@ -1,4 +1,4 @@
-"""Formats of machines' files, and how each is recognised by its content."""
+"""Formats of machines' files, each recognised by its content."""
 
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
@@ -6,28 +6,28 @@ from typing import Final, NamedTuple
 
 UTF_16: Final = (BOM_UTF16_LE, BOM_UTF16_BE)
 _LOOKED_AT: Final = 1_000_000
-"""Characters in which the first line or element of a format stands."""
+"""Characters among which the first line or element of a format is [1]."""
 
 
 class Format(NamedTuple):
-    """A format that is read, and how it is recognised: by one of roots, pattern and head."""
+    """A format that is read. Its root elements, a pattern of its text or its first bytes identify it."""
 
     title: str
-    """Name of the format, and what its files hold."""
+    """Name of the format, and content of its files."""
     module: str
-    """Reader of its files."""
+    """Module that reads its files."""
     roots: tuple[str, ...] = ()
-    """Tags of the root element, for XML."""
+    """Tags of the root element of XML."""
     pattern: str = ""
-    """Pattern of a line that only files of the format have, for text."""
+    """Pattern of a line that only texts of this format have."""
     dialect: str = ""
     """Argument of a reader that reads several formats."""
     head: bytes = b""
-    """Pattern of the first bytes, for recordings."""
+    """Pattern of the first bytes of a recording."""
 
     @property
     def short(self) -> str:
-        """Its name alone."""
+        """Name of the format alone."""
         return self.title.partition(" (")[0]
 
 
@@ -70,7 +70,7 @@ def root_tag(content: bytes) -> str | None:
 
 
 def matching(content: bytes) -> list[Format]:
-    """Formats that a file may be of, by its content: none, one, or several of text."""
+    """Formats that the content of a file fits: none, one, or several of text."""
     recordings = [each for each in FORMATS if each.head and re.match(each.head, content)]
     if recordings:
         return recordings

@@ -1,4 +1,4 @@
-"""Measured latencies from CSV, rows or columns; every problem is reported with its line and column."""
+"""Measured latencies from CSV, rows or columns; every problem has its line and column."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ _TIMES: Final = {
     "ns": "divide by 1000",
 }
 _SIZES: Final = {"": "", "byte": "", "b": "", "bits": "divide by 8", "quadlets": "multiply by 4"}
-"""How to convert a unit in a column name to our unit; empty if it may be ours already."""
+"""Conversion of a unit in a column's name; empty for a unit that may already be ours."""
 
 
 class Measurement(NamedTuple):
@@ -40,7 +40,7 @@ class Measurement(NamedTuple):
     transaction: TransactionKind
     payload_bytes: int
     latency_us: float
-    """T_lant, measured."""
+    """Measured latency T_lant [us]."""
 
 
 class MeasuredCell(NamedTuple):
@@ -48,32 +48,15 @@ class MeasuredCell(NamedTuple):
 
     text: str
     column: int
-    """Where it stands in the line, from 1."""
+    """Column of its first character in the line, from 1."""
 
 
 def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
-    r"""Read measurements from the bytes of a CSV file.
+    r"""Read measurements, at least one, from the bytes of a CSV file.
 
     The first line that is neither empty nor a comment (#) is the header. Columns are payload_bytes and latency_us, and
     optionally transaction (read or write, default write), in any order. Values are separated by commas; numbers have a
-    decimal point.
-
-    Parameters
-    ----------
-    content
-        The file.
-    name
-        Name of the file in messages.
-
-    Returns
-    -------
-    tuple
-        Measurements in the order of the file, at least one.
-
-    Raises
-    ------
-    PlacedError
-        All problems of the file, with their places.
+    decimal point. All problems of the file are raised as one PlacedError.
 
     Examples
     --------
@@ -93,23 +76,9 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
 def measurements_below(
     header: Sequence[MeasuredCell], rows: Sequence[tuple[int, Sequence[MeasuredCell]]], *, line: int, name: str
 ) -> tuple[Measurement, ...]:
-    """Read the rows below a header.
+    """Read the rows below a header, each with its line from 1; `line` is that of the header.
 
-    Parameters
-    ----------
-    header
-        Names of the columns.
-    rows
-        Each row with its line, from 1.
-    line
-        Line of the header.
-    name
-        Name of the measurements in messages.
-
-    Raises
-    ------
-    PlacedError
-        All problems, with their places.
+    All problems are raised as one PlacedError.
     """
     problems = list(_header_problems(line, header))
     if problems:
@@ -126,7 +95,7 @@ def measurements_below(
 
 
 def _rows(text: str) -> Iterator[tuple[int, list[MeasuredCell]]]:
-    """Lines with values, and their numbers."""
+    """Lines with values, each with its number."""
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         values = line.partition("#")[0]
         if values.strip():
@@ -171,7 +140,7 @@ def _header_problems(line: int, header: Sequence[MeasuredCell]) -> Iterator[Plac
 
 
 def _meant(written: str) -> str:
-    """Say what to do about an unknown column."""
+    """Advice for an unknown column."""
     match = _QUANTITY.fullmatch(written.strip().lower())
     if match:
         quantity = match["quantity"]
@@ -234,27 +203,11 @@ _EXPECTED_TABLE: Final = (
 
 
 def measurements_from(given: object, *, name: str) -> tuple[Measurement, ...]:
-    """Read measurements from columns by name, such as a data frame, or from several rows.
+    """Read measurements from columns by name, such as a data frame, or from rows; `line` is the row's number, from 1.
 
-    Parameters
-    ----------
-    given
-        Columns: a mapping, or anything with `keys()` and `[name]`, to values of one length. Or rows: mappings by
-        column, or values in the order of the columns. Columns and units are those of a CSV file.
-    name
-        Name of the measurements in messages.
-
-    Returns
-    -------
-    tuple
-        Measurements in their order; the `line` of each is the number of its row, from 1.
-
-    Raises
-    ------
-    BusplanError
-        Neither columns nor rows, or rows with different columns.
-    PlacedError
-        All problems of the values, with row and column.
+    Columns are a mapping, or anything with `keys()` and `[name]`, to values of one length. Rows are mappings by column,
+    or values in the order of the columns. Names and units are those of a CSV file. Other data raise BusplanError, as do
+    rows with different columns; problems of values raise PlacedError, with row and column.
 
     Examples
     --------

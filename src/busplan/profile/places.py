@@ -1,4 +1,4 @@
-"""Places of keys, values and comments in a TOML text: the standard library's parser tells none."""
+"""Places of keys, values and comments in a TOML text, which the standard library's parser does not report."""
 
 import re
 import tomllib
@@ -12,10 +12,10 @@ KeyPath = tuple[str | int, ...]
 
 
 class Place(NamedTuple):
-    """Place of a key and of its value, as offsets into the text, ends excluded.
+    """Offsets of a key and of its value in the text, ends excluded.
 
-    An element of an array has no key: its key span is its value span. A table without a text of its own (`[a]`,
-    `a.b = 1`) has its key span as value span.
+    An element of an array has no key: its key span is its value span. A table without a text of its own (`[a]`, `a.b =
+    1`) has its key span as value span.
     """
 
     key_start: int
@@ -25,9 +25,9 @@ class Place(NamedTuple):
 
 
 _GAP: Final = re.compile(r"[ \t\n,]*(?:#[^\n]*[ \t\n,]*)*")
-"""Between two statements, or two values of an array or inline table."""
+"""Text between two statements, or between two values of an array or inline table."""
 _KEY: Final = re.compile(r"""[ \t]*([A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')[ \t]*([.=\]]?)[ \t]*""")
-"""One part of a key, and the sign after it."""
+"""Part of a key, and the sign after it."""
 # A multi-line string may end in one or two quotes before the closing three.
 _STRING: Final = (
     r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
@@ -39,13 +39,13 @@ _STRING_OR_COMMENT: Final = re.compile(_STRING + r"|(#)[^\n]*", re.DOTALL)
 
 @dataclass(slots=True)
 class _Container:
-    """An array or inline table that the scanner is inside of."""
+    """An array or inline table around the scanner's position."""
 
     path: KeyPath
     start: int
     is_array: bool
     length: int = 0
-    """Elements of an array that were read."""
+    """Elements of an array read so far."""
 
 
 class _Scanner:
@@ -90,7 +90,10 @@ class _Scanner:
         self.places[path] = Place(key_start, key_end, start, self.at)
 
     def key(self, path: KeyPath) -> tuple[KeyPath, Place]:
-        """Read a, "b" or a.b.c inside a table, and the sign after it: its path and the place of its last part."""
+        """Read a, "b" or a.b.c inside a table, and the sign after it.
+
+        Returns the path, and the place of its last part.
+        """
         while match := _KEY.match(self.text, self.at):
             if path in self.newest:
                 path = (*path, self.newest[path])
@@ -100,7 +103,7 @@ class _Scanner:
             self.at = match.end()
             if match[2] != ".":
                 return path, place
-        raise ValueError(f"no key at offset {self.at}")  # impossible for text that tomllib has accepted
+        raise ValueError(f"no key at offset {self.at}")  # Text that tomllib has accepted does not come here.
 
     def header(self) -> KeyPath:
         """Read [a.b] or [[a.b]]; return the table of the next line."""
@@ -124,12 +127,7 @@ def _key_value(written: str) -> str:
 
 
 def places(text: str) -> dict[KeyPath, Place]:
-    r"""Find the place of every key and array element.
-
-    Parameters
-    ----------
-    text
-        TOML that `tomllib.loads` has accepted, with LF as line end.
+    r"""Places of all keys and array elements of a text that `tomllib.loads` has accepted, with LF as line end.
 
     References
     ----------
@@ -146,7 +144,7 @@ def places(text: str) -> dict[KeyPath, Place]:
 
 
 def comments(text: str) -> list[int]:
-    r"""Find the hash of every comment of such a text.
+    r"""Offsets of all comments of such a text, each at its hash.
 
     Examples
     --------
@@ -158,7 +156,7 @@ def comments(text: str) -> list[int]:
 
 
 class Lines:
-    """Convert between offsets in a text and lines and columns, both counted from 1, columns in characters."""
+    """Conversion between offsets in a text and lines and columns, which count characters; both from 1."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -169,7 +167,7 @@ class Lines:
         return self._starts[line - 1] + column - 1
 
     def line_and_column(self, offset: int) -> tuple[int, int]:
-        """Line and column of an offset; one past the end belongs to the last line that has text."""
+        """Line and column of an offset; one past the end belongs to the last line with text."""
         if offset >= len(self._text):
             offset = len(self._text.rstrip("\r\n"))
         line = bisect_right(self._starts, offset)

@@ -1,4 +1,4 @@
-"""Translate pydantic's validation errors into problems of profile keys."""
+"""Translation of pydantic's validation errors into problems of profile keys."""
 
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -49,9 +49,9 @@ class KeyFinding(NamedTuple):
     message: str
     kind: ProblemKind
     shows_value: bool = True
-    """If True, the message shows the value."""
+    """Whether the message shows the value."""
     named: KeyPath = ()
-    """The path with the names of groups instead of their places."""
+    """The path with names of groups instead of indexes."""
 
     @property
     def key(self) -> str:
@@ -68,20 +68,7 @@ def _quoted(part: str) -> str:
 
 
 def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[KeyFinding]:
-    """Translate a validation error.
-
-    Parameters
-    ----------
-    error
-        Error of pydantic for `data`; None if only the kind of bus is wrong.
-    data
-        The validated data.
-
-    Yields
-    ------
-    KeyFinding
-        One for each problem, in pydantic's order.
-    """
+    """Problems of a validation error, in pydantic's order; an error of None stands for an unknown kind of bus alone."""
     of_keys = () if error is None else (*_validated(error, data), *_of_nodes(data))
     names: dict[int, Any] = {}
     for finding in dict.fromkeys((*of_keys, *_unknown_kind(data))):
@@ -89,18 +76,18 @@ def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[Ke
 
 
 def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
-    """Problems of how a profile says its nodes: the model looks for them only where there are no others."""
+    """Problems of the keys that declare nodes: the model looks for them only where there are no others."""
     bus, model = data.get("bus"), profile_model(kind_of(data))
     present = {name for name in data if name in model.model_fields}
     if not isinstance(bus, dict) or "nodes" in bus or kind_of(data) is None:
-        present.add("bus.nodes")  # or nobody can tell
+        present.add("bus.nodes")  # Without a section of a known kind, nobody can tell.
     for problem in model.nodes_problems(present):
         if problem.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
             yield _of_problem(problem, (), model)
 
 
 def _of_problem(problem: Problem, path: KeyPath, model: type[BaseModel]) -> KeyFinding:
-    """Finding of a problem that a validator of ours reports at a path."""
+    """Finding for a problem that one of our validators reports at a path."""
     if problem.key:
         path = (*path, *(int(part) if part.isdigit() else part for part in problem.key.split(".")))
     if problem.message != MISSING:
@@ -133,14 +120,14 @@ def _validated(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFind
 
 
 def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
-    """Problem of a kind of bus that is unknown: the common model cannot find it."""
+    """Problem of an unknown kind of bus, which the common model does not find."""
     bus = data.get("bus")
     if kind_of(data) is None and isinstance(bus, dict) and isinstance(bus.get("kind"), str):
         yield KeyFinding(("bus", "kind"), f"expected {' or '.join(map(value_text, kind_names()))}", "out-of-range")
 
 
 def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyPath, type[BaseModel]]:
-    """Key path of a pydantic location, without the tags of unions in it, and the section of its last key."""
+    """Key path of a pydantic location, without the tags of unions, and the section of its last key."""
     path: list[int | str] = []
     members, section = [model], model
     for part in location:
@@ -200,7 +187,7 @@ def _missing(path: KeyPath, section: type[BaseModel]) -> str:
 
 
 def _example(model: type[BaseModel]) -> str:
-    """Keys that a section needs, or its first two, as a table in a line."""
+    """Keys that a section needs, or its first two, as an inline table."""
     needed = [name for name, field in model.model_fields.items() if field.is_required()]
     fields = {name: model.model_fields[name] for name in needed or list(model.model_fields)[:2]}
     keys = (
@@ -214,7 +201,7 @@ _REMOVED: Final[dict[tuple[str, ...], str]] = {
     ("bus", "timing_model"): "no longer a key: the model that decides always comes first; delete the line, and use "
     "--timing-model to show another",
 }
-"""Keys of earlier profiles, with what to do instead."""
+"""Keys of earlier profiles, with advice."""
 
 
 def _unknown(path: KeyPath, section: type[BaseModel], model: type[BaseModel]) -> str:
@@ -236,13 +223,13 @@ def _unknown(path: KeyPath, section: type[BaseModel], model: type[BaseModel]) ->
         if number and (part == name or part.startswith(f"{name}_"))
     ]
     close = get_close_matches(name, names, n=1)
-    # A name at the top is more likely one of a section than a misspelt other.
+    # A name at the top is more likely that of a section than a misspelt other.
     meant = [*elsewhere, *close] if len(path) == 1 else [*close, *elsewhere]
     return f"unknown key; did you mean {meant[0]}?" if meant else f"unknown key; known here: {', '.join(names)}"
 
 
 def _kinds_beside(model: type[BaseModel], section: type[BaseModel]) -> dict[str, type[BaseModel]]:
-    """Other models that a table may have instead of this one, by the word of their `kind`."""
+    """Other models that a table may have instead of this one, by their word of `kind`."""
     for field in model.model_fields.values():
         models = models_of(field.annotation)
         if section in models:
@@ -258,15 +245,7 @@ def _word_of_kind(section: type[BaseModel]) -> str:
 
 
 def refusal(error: ValidationError | None, data: dict[str, Any], document: Document) -> PlacedError:
-    """Make the error for a document, with all problems in the order of their places.
-
-    Parameters
-    ----------
-    error, data
-        As for `findings`.
-    document
-        The document of the data.
-    """
+    """Error for a document, with all problems in the order of their places."""
     problems = (_problem(document, finding) for finding in findings(error, data))
     placed = sorted(problems, key=lambda problem: (problem.line, problem.column))
     return PlacedError(document.name, tuple(placed))
@@ -296,20 +275,14 @@ def _shortened(written: str, limit: int = 40) -> str:
 
 
 def refused_data(error: ValidationError | None, data: dict[str, Any]) -> BusplanError:
-    """Make the error for data of no file; each problem names its key.
-
-    Parameters
-    ----------
-    error, data
-        As for `findings`.
-    """
+    """Error for data that stand in no file; each problem names its key."""
     return BusplanError(*(f"{finding.key}: {finding.message}" for finding in findings(error, data)))
 
 
 def refused_changes(
     error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:
-    """Make the error for changes of a profile; each problem names what set its key."""
+    """Error for changes of a profile; each problem names what set its key."""
     sources: dict[KeyPath, str] = {
         path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
@@ -317,7 +290,7 @@ def refused_changes(
 
 
 def _of_changes(finding: KeyFinding, sources: dict[KeyPath, str]) -> str:
-    """Message for a problem after changes: of a changed key, of a key around or inside it, or of any other key."""
+    """Message for a problem after changes, at a changed key, a key around or inside it, or any other."""
     if finding.path in sources:
         return f"{sources[finding.path]}: {finding.message}"
     near = [source for path, source in sources.items() if all(map(eq, path, finding.path))]

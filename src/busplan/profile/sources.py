@@ -1,4 +1,4 @@
-"""Where profiles come from: shipped ones, files, folders, standard input, and revisions of git."""
+"""Sources of profiles: shipped ones, files, folders, standard input and revisions of git."""
 
 import os
 import re
@@ -28,20 +28,11 @@ def shipped_names() -> list[str]:
 
 
 def locate(argument: str) -> tuple[Path, str]:
-    """Find the file of a PROFILE argument.
+    """Path of a PROFILE argument, and its name in messages.
 
     A shipped name always means the shipped profile, so that the answer does not depend on the working directory.
-    Everything else is a path: ./paper-4ms, paper-4ms.toml, or "-" for standard input.
-
-    Returns
-    -------
-    tuple
-        Path, and name in messages.
-
-    Raises
-    ------
-    BusplanError
-        Neither a shipped name nor an existing file.
+    Everything else is a path: ./paper-4ms, paper-4ms.toml, or "-" for standard input. An argument that is neither a
+    shipped name nor an existing file raises BusplanError.
     """
     if argument == "-":
         return Path("-"), "<stdin>"
@@ -55,7 +46,7 @@ def locate(argument: str) -> tuple[Path, str]:
 
 
 def _unknown(argument: str, path: Path) -> str:
-    """Say that there is no such profile, and which one may be meant: a file without its ending, or a near name."""
+    """Message for an unknown profile, with the one that may be meant: a file without its ending, or a near name."""
     from busplan.english import did_you_mean
 
     shown = argument or repr(argument)
@@ -84,14 +75,10 @@ class MeasurementsFile(NamedTuple):
 
 
 def locate_measurements(argument: str) -> MeasurementsFile:
-    """Find the file of a MEASUREMENTS argument.
+    """Path of a MEASUREMENTS argument.
 
-    An existing file comes first, so that the user's measurements are never mistaken for the shipped example.
-
-    Raises
-    ------
-    BusplanError
-        Neither an existing file nor the name of a shipped example.
+    An existing file comes first, so that the user's measurements are never mistaken for the shipped example. Without a
+    file or an example of that name it raises BusplanError.
     """
     if argument == "-":
         return MeasurementsFile(Path("-"), "<stdin>", shipped=False)
@@ -105,17 +92,10 @@ def locate_measurements(argument: str) -> MeasurementsFile:
 
 
 def load(argument: str) -> LoadedProfile:
-    """Read and check the profile of a PROFILE argument.
+    """Read and check the profile of a PROFILE argument: a shipped name, a path, or "-" for standard input.
 
-    Parameters
-    ----------
-    argument
-        Shipped name, path, or "-" for standard input.
-
-    Raises
-    ------
-    BusplanError
-        The file does not exist, cannot be read or is not a valid profile; every problem has its place.
+    A file that does not exist or cannot be read raises BusplanError, as does one that is not a valid profile; every
+    problem has its place.
     """
     path, name = locate(argument)
     document = decode(read_bytes(path, name=name), name=name)
@@ -125,35 +105,29 @@ def load(argument: str) -> LoadedProfile:
 SETTINGS_FILE: Final = "busplan.toml"
 """Settings of `busplan check`; a file of this name is never a profile."""
 TIMEOUT_S: Final = 10.0
-"""Longest wait for git, which only reads a short file."""
+"""Longest wait for git, which only reads a short file [s]."""
 
 _FORM: Final = re.compile(r"(?P<revision>(?!-)(?:\{[^}]*\}|[^:{])+):(?P<path>.+)", re.DOTALL)
-"""A colon in braces belongs to the revision: main@{10:00}:line.toml. A dash at the start would be an option."""
+"""Form REV:path. A colon in braces belongs to the revision, as in main@{10:00}:line.toml; a leading dash would be an
+option.
+"""
 _BLOB: Final = re.compile(r"(?P<id>[0-9a-f]{40,64}) blob (?P<size>[0-9]+)\n")
 """Git's answer for an existing file."""
 _NEVER: Final = ("\0", "\n", "\r")
 """Characters that end a name for git."""
 _KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_NO_REPLACE")
-"""Prefixes of git's variables that are kept; others, which git sets for hooks, would select another repository."""
+"""Prefixes of git's variables that are kept. Others, which git sets for hooks, would select another repository."""
 _AT_HOME: Final = ("-c", "protocol.allow=never", "-c", "core.fsmonitor=false")
-"""No network access, and no program configured in the repository."""
+"""Options against network access and against programs configured in the repository."""
 _ALONE: Final = {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": ""}
-"""No network access, even if the configuration of the repository allows a protocol."""
+"""Variables against network access, even if the repository's configuration allows a protocol."""
 
 
 def load_revision(argument: str) -> LoadedProfile:
     """Read and check a profile as `load` does, or from REV:path.
 
-    Parameters
-    ----------
-    argument
-        Shipped name, path, "-" for standard input; or a commit, branch or tag, a colon and a path, relative to the
-        current folder, in the git checkout of the path. An existing file of exactly that name comes first.
-
-    Raises
-    ------
-    BusplanError
-        As `load`; or git cannot read the file, with git's message.
+    REV is a commit, branch or tag, and the path is relative to the current folder, in its own git checkout. An existing
+    file of exactly that name comes first. If git cannot read the file, BusplanError has git's message.
     """
     form = _FORM.fullmatch(argument)
     if form is None or any(mark in argument for mark in _NEVER) or _is_there(argument):
@@ -171,8 +145,8 @@ def _is_there(argument: str) -> bool:
 
 
 def _content(argument: str, revision: str, path: Path) -> bytes:
-    """Content of the file in the revision, links followed."""
-    # The folder of the path may no longer exist: use the nearest existing one above it.
+    """Content of the file in the revision; links are followed."""
+    # The folder of the path may no longer exist, so the nearest existing one above it is used.
     folder = path.parent
     try:
         while not folder.is_dir():
@@ -183,7 +157,7 @@ def _content(argument: str, revision: str, path: Path) -> bytes:
     check = ("cat-file", "--batch-check", "--follow-symlinks")
     file = _BLOB.fullmatch(_git(argument, folder, *check, names=name).decode(errors="replace"))
     if file is None:
-        # Reading the object itself gives git's error message; for a link it succeeds.
+        # Reading the object itself gives git's error message. For a link it succeeds.
         _git(argument, folder, "cat-file", "blob", name)
         raise BusplanError(f"{argument}: leads to no file of revision {revision}; name the file itself, not a link")
     if int(file["size"]) > MAX_FILE_BYTES:
@@ -192,7 +166,7 @@ def _content(argument: str, revision: str, path: Path) -> bytes:
 
 
 def _git(argument: str, folder: Path, *command: str, names: str = "") -> bytes:
-    """Run git in a folder and return its output."""
+    """Output of git, run in a folder."""
     git = shutil.which("git")
     if git is None:
         raise BusplanError(f"{argument}: no such file; to read REV:path needs git, and there is no git on PATH")
@@ -212,7 +186,7 @@ def _git(argument: str, folder: Path, *command: str, names: str = "") -> bytes:
         raise BusplanError(f"{argument}: git gave no answer within {TIMEOUT_S:g} s") from None
     except OSError as error:
         raise BusplanError(f"{argument}: git cannot be run: {error.strerror}") from None
-    # A warning means that git may have chosen another revision: an ambiguous name, or a reflog that is too short.
+    # After a warning git may have chosen another revision: an ambiguous name, or a reflog that is too short.
     if done.returncode or done.stderr:
         message = printable(" ".join(done.stderr.decode(errors="backslashreplace").split()))
         raise BusplanError(f"{argument}: no file of that name; of REV:path git says: {message or 'nothing'}")
@@ -224,42 +198,30 @@ _SKIPPED_FOLDERS = {"node_modules", "__pycache__"}
 
 
 class ProfileSource(NamedTuple):
-    """One profile to read with its name in messages; or a path that leads to none."""
+    """A profile to read with its name in messages, or a path without one."""
 
     path: Path
     name: str
     failure: str | None = None
-    """Why there is no profile to read."""
+    """Reason why there is no profile to read."""
     is_shipped: bool = False
     """Whether it is a shipped profile, named as such."""
 
 
 class Collection(NamedTuple):
-    """Profiles of a list of paths."""
+    """Profiles in a list of paths."""
 
     sources: tuple[ProfileSource, ...]
     skipped: tuple[str, ...]
-    """Files without a `schema_version`: TOML files below a folder, and with `skip_others` those that are named."""
+    """Files without a `schema_version`: TOML files below a folder, and with `skip_others` also named ones."""
 
 
 def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>", skip_others: bool = False) -> Collection:
-    """Find the profiles of a list of paths, each once.
+    """Find the profiles in a list of paths, each once, in their order; those of a folder are sorted by name.
 
-    Parameters
-    ----------
-    arguments
-        Files, folders (every *.toml below that claims a `schema_version`; hidden folders are left out), shipped names,
-        and "-" for standard input.
-    stdin_name
-        Name of standard input in messages.
-    skip_others
-        If True, skip named files that claim no `schema_version`, too; without it they are checked, and refused.
-
-    Returns
-    -------
-    Collection
-        Sources in the order of the arguments, sorted by name in a folder; a path without a profile is a source with a
-        failure. Names are relative to the working folder for files below it.
+    Arguments are files, folders (every *.toml below that has a `schema_version`, except in hidden folders), shipped
+    names, and "-" for standard input. With `skip_others` a named file without `schema_version` is skipped, not refused.
+    A path without a profile is a source with a failure. Names are relative to the working folder for files below it.
     """
     sources: dict[str, ProfileSource] = {}
     names: set[str] = set()
@@ -269,7 +231,7 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>", skip_other
             key = _place(source.path).as_posix() if source.failure is None else source.failure
             if key in sources:
                 continue
-            # A shipped profile and a file can have the same name: the second one gets its full path.
+            # A shipped profile and a file can have the same name; the second one gets its full path.
             taken = source.failure is None and source.name in names
             sources[key] = source._replace(name=source.path.absolute().as_posix()) if taken else source
             names.add(source.name)
@@ -282,7 +244,7 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: b
         path, name = locate(argument)
         if argument == "-":
             yield ProfileSource(path, stdin_name)
-        elif name != argument:  # a shipped name, whatever lies in the working folder
+        elif name != argument:  # It is a shipped name, whatever the working folder contains.
             yield ProfileSource(path, name, is_shipped=True)
         elif path.is_dir():
             yield from _below(path, skipped)
@@ -312,7 +274,7 @@ def _name(path: Path) -> str:
 
 
 def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
-    """Every profile below a folder, sorted by name, and every folder that cannot be read."""
+    """Sources below a folder: every profile, sorted by name, and every folder that cannot be read."""
     unreadable: list[OSError] = []
     has_profile = False
     for root, folders, files in os.walk(folder, onerror=unreadable.append):
@@ -335,7 +297,7 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
 
 
 def claims(path: Path) -> bool:
-    """Whether a TOML file has a `schema_version`; True if it cannot be read, so that reading it reports the error."""
+    """Whether a TOML file has a `schema_version`; True for an unreadable one, so that reading it reports the error."""
     try:
         if not path.is_file():
             return False

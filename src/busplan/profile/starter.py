@@ -23,7 +23,7 @@ _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ign
 
 
 _LONGEST_STEP_US: Final = 100.0
-"""Longest position-loop period of a new profile."""
+"""Longest position-loop period of a new profile [us]."""
 _COMMENTS_AT: Final = 27
 """Column of the comments of a new profile."""
 _MACHINE: Final = """\
@@ -85,17 +85,17 @@ axes = {axes}
 
 
 class NodeGroup(NamedTuple):
-    """Like nodes of a new machine."""
+    """Alike nodes of a new machine."""
 
     name: str
-    """Empty for the nodes of a machine whose nodes are all alike."""
+    """Name of the group; empty where all nodes of the machine are alike."""
     nodes: int
     axes: int
     """Axes of one node."""
     read_bytes: int | None = None
-    """Payload that a node sends; None for that of its axes."""
+    """Payload that a node sends [bytes]; None for that of its axes."""
     write_bytes: int | None = None
-    """Payload that a node receives; None for that of its axes."""
+    """Payload that a node receives [bytes]; None for that of its axes."""
 
 
 class Machine(NamedTuple):
@@ -104,7 +104,7 @@ class Machine(NamedTuple):
     groups: tuple[NodeGroup, ...]
     period_us: float
     bytes_per_axis: int
-    """Payload of each axis, in either direction; that of a node without axes and bytes of its own."""
+    """Payload of each axis in either direction [bytes]; also that of a node without axes and bytes of its own."""
     host: str | None = None
     """Name among the hosts of the kind; None for its usual one."""
     variant: str = ""
@@ -114,7 +114,7 @@ class Machine(NamedTuple):
 
 
 def shared_out(axes: int, *, nodes: int) -> tuple[NodeGroup, ...]:
-    """Share axes out over nodes as evenly as possible: alike nodes, or two groups.
+    """Share axes out over nodes as evenly as possible, in one group of alike nodes or two.
 
     Examples
     --------
@@ -131,21 +131,8 @@ def shared_out(axes: int, *, nodes: int) -> tuple[NodeGroup, ...]:
 def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     """Text of a profile of an unmeasured machine; every assumed value says so.
 
-    Parameters
-    ----------
-    machine
-        Nodes, axes, period and payload.
-    kind
-        Kind of bus.
-    name
-        Name of the profile.
-    file
-        Its file, as a command line takes it.
-
-    Raises
-    ------
-    BusplanError
-        An invalid name, or groups that the kind of bus cannot have.
+    `file` is the profile's file as a command line takes it. An invalid name, or groups that the kind of bus cannot
+    have, raise BusplanError.
     """
     starter = kind_named(kind).starter
     first = machine.groups[0]
@@ -204,7 +191,7 @@ def _checked(text: str, *, name: str) -> str:
         if problems:
             raise BusplanError(*(problem.message for problem in problems)) from None
         raise _nameless(name) from None
-    except UnicodeEncodeError:  # a file name that is not UTF-8
+    except UnicodeEncodeError:  # The name of the file is not UTF-8.
         raise _nameless(name) from None
     return text
 
@@ -216,17 +203,7 @@ def _nameless(name: str) -> BusplanError:
 def starter_text(source: str, *, name: str) -> str:
     """Text of a shipped profile under a new name.
 
-    Parameters
-    ----------
-    source
-        Name of the shipped profile.
-    name
-        Name of the new profile.
-
-    Raises
-    ------
-    BusplanError
-        No such shipped profile, or an invalid name.
+    An unknown source or an invalid name raises BusplanError.
     """
     if source not in shipped_names():
         near = did_you_mean(source, shipped_names())
@@ -235,7 +212,7 @@ def starter_text(source: str, *, name: str) -> str:
     path, _ = locate(source)
     document = decode(read_bytes(path, name=source), name=source)
     place = document.places["name",]
-    # Remove suppressions: they were decided for the shipped profile, not for the new machine.
+    # Remove suppressions: they are decisions about the shipped profile, not about the new machine.
     before, after = document.text[: place.value_start], document.text[place.value_end :]
     after = _SUPPRESSION.sub("", after)
     if ("circle", "path") not in document.places:

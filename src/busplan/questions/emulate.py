@@ -1,4 +1,4 @@
-"""`busplan.emulate`: the recording which the planned machine would give, so that software is tried before it exists."""
+"""`busplan.emulate`: the recording that the planned machine would give, for software that is tried before it exists."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,49 +28,35 @@ _CYCLES = 1000
 
 @dataclass(frozen=True, repr=False)
 class EmulateAnswer(Answer):
-    """Answer of `emulate`: a synthetic recording, which `save` writes.
-
-    Parameters
-    ----------
-    profile
-        The plan.
-    content
-        The recording, in the format of its kind of bus.
-    endings
-        Endings of the name of a file with it.
-    cycles
-        Its length; of messages alone in periods of the fastest.
-    duration_us
-        The same [us].
-    seed
-        Seed of its random numbers.
-    faults
-        Value of each fault, by name: how often, or how late [us].
-    described
-        What the machine does at each fault, and which figure shows it.
-    inside
-        Faults that lie inside the plan, so that `measured` finds nothing beyond it.
-    unsure
-        Faults beyond it by less than the plan is uncertain, so that `measured` does not show them.
-    """
+    """Answer of `emulate`: a synthetic recording, which `save` writes."""
 
     profile: Profile
+    """The plan."""
     content: bytes
+    """Recording in the format of its kind of bus."""
     endings: tuple[str, ...]
+    """Endings of the name of a file with the recording."""
     cycles: int
+    """Length of the recording [cycles]; for messages alone, periods of the fastest one."""
     duration_us: float
+    """Length of the recording [us]."""
     seed: int
+    """Seed of the random numbers."""
     faults: Mapping[str, float]
+    """Value of each fault by name: its number in the recording, or its delay [us]."""
     described: tuple[Fault, ...]
+    """Behaviour of the machine at each fault, and the figure that shows it."""
     inside: tuple[str, ...]
+    """Faults inside the plan, so that `measured` finds nothing beyond it."""
     unsure: tuple[str, ...]
+    """Faults beyond the plan by less than its uncertainty, so that `measured` does not show them."""
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         recordings = dict.fromkeys(self.endings, lambda: self.content)
         return {**super()._contents(), **recordings}
 
     def report(self) -> Report:
-        """What is in the recording."""
+        """Contents of the recording."""
         name = self.profile.name
         length = f"{plural(self.cycles, 'cycle')}, {self.duration_us / 1e6:g} s, seed {self.seed}"
         lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It counts as no measurement."))]
@@ -107,13 +93,14 @@ def emulate(
     profile
         The plan: a `Profile`, a path or a shipped name.
     cycles
-        Cycles of the recording; of messages alone, periods of the fastest. By default 1,000.
+        Cycles of the recording, by default 1,000; for messages alone, periods of the fastest one.
     duration_us
-        Instead of it, a time [us].
+        Length of the recording, instead of cycles [us].
     seed
-        Of the random numbers; the same seed gives the same bytes.
+        Seed of the random numbers. The same seed gives the same bytes.
     fault
-        Faults of the machine by name, each with its value: how often, or how late [us]; None for its default.
+        Faults of the machine by name, each with its value: number in the recording, or delay [us]; None for its
+        default.
 
     Raises
     ------
@@ -159,7 +146,7 @@ def emulate(
 def _not_found(
     network: Network, emulator: Emulator, content: bytes, faults: Mapping[str, float]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Faults whose figure of the recording is within the plan, and those whose figure is not shown to be outside."""
+    """Faults whose recorded figure is within the plan, and those whose figure is not shown to be outside."""
     if not faults:
         return (), ()
     with TemporaryDirectory() as folder:
@@ -173,13 +160,7 @@ def _not_found(
 
 
 def emulator_of(profile: Profile) -> Emulator:
-    """What the kind of bus of a profile emulates.
-
-    Raises
-    ------
-    BusplanError
-        No recording of that kind of bus is emulated.
-    """
+    """Emulator of a profile's kind of bus; a kind without one raises BusplanError."""
     emulator = bus_of(profile).emulator()
     if emulator is None:
         kinds = listed([name for name in kind_names() if kind_named(name).emulator()], "and")
@@ -188,13 +169,7 @@ def emulator_of(profile: Profile) -> Emulator:
 
 
 def fault_named(emulator: Emulator, name: str) -> Fault:
-    """A fault that can be emulated.
-
-    Raises
-    ------
-    BusplanError
-        It has none of that name.
-    """
+    """Fault of an emulator by name; an unknown one raises BusplanError."""
     faults = {fault.name: fault for fault in emulator.faults}
     if name not in faults:
         hints = "; ".join(filter(None, (f"there are {', '.join(faults)}", did_you_mean(str(name), faults))))
@@ -203,7 +178,7 @@ def fault_named(emulator: Emulator, name: str) -> Fault:
 
 
 def _value(fault: Fault, value: object, period_us: float) -> float:
-    """Value of a fault: how often, or how late [us]."""
+    """Value of a fault: its number in the recording, or its delay [us]."""
     name = f"fault {fault.name}"
     if fault.unit == "1":
         return whole(int(fault.default) if value is None else value, name=name)

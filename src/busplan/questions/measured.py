@@ -47,7 +47,7 @@ _COLUMNS: Final = (
 )
 _DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2, "kbit/s": 1}
 _UNITS: Final = {"1": "", "share": "%"}
-"""How a unit is shown, where it differs."""
+"""Units that are shown in another way."""
 _WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
     None: "",
     "within": Words("yes", "passes"),
@@ -55,42 +55,29 @@ _WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
     "outside": Words("no", "fails"),
 }
 _SMALL_US: Final = 1.0
-"""A time below this is shown with more decimals [us]."""
+"""Time below which more decimals are shown [us]."""
 _LEAST_QUANTILE = 0.5
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MeasuredAnswer(Answer):
-    """Answer of `measured`.
-
-    Parameters
-    ----------
-    profile
-        The plan.
-    source
-        Name of the recording.
-    quantile
-        Quantile of the events for worst cases, 0.5..1.
-    figures
-        Every figure, planned and recorded.
-    remarks
-        Sentences on what else the recording has, and what it does not show.
-    edits
-        New value of each measured key, as `--apply` writes it; None removes a key.
-    day
-        Day of the recording in UTC, such as 2026-11-23; empty where its stamps do not say it.
-    shows_nothing
-        Why the recording as a whole cannot show that the machine keeps its plan; empty where it can.
-    """
+    """Answer of `measured`."""
 
     profile: Profile
     source: str
+    """Name of the recording."""
     quantile: float
+    """Quantile of the events for worst cases, 0.5..1 [1]."""
     figures: tuple[RecordedFigure, ...]
+    """Figures, planned and recorded."""
     remarks: tuple[str, ...]
+    """Sentences on other contents of the recording, and on what it does not show."""
     edits: Mapping[str, object]
+    """New value of each measured key, as `--apply` writes it; None removes a key."""
     day: str
+    """Day of the recording in UTC, such as 2026-11-23; empty if its stamps do not tell it."""
     shows_nothing: tuple[str, ...]
+    """Reasons why the recording as a whole cannot show that the machine keeps its plan; empty if it can."""
 
     @property
     def outside(self) -> tuple[RecordedFigure, ...]:
@@ -99,7 +86,7 @@ class MeasuredAnswer(Answer):
 
     @property
     def notes(self) -> dict[str, str]:
-        """The comment that `--apply` writes above each section: quantile, number of events, file and day."""
+        """Comments that `--apply` writes above the sections: quantile, number of events, file and day."""
         return {section: self._origin(section) for section in {key.rpartition(".")[0]: None for key in self.edits}}
 
     def _origin(self, section: str) -> str:
@@ -119,7 +106,7 @@ class MeasuredAnswer(Answer):
         Parameters
         ----------
         applied_to
-            The profile's file that measured values were written into; by default none.
+            File of the profile into which measured values were written; by default none.
         """
         records = [_record(figure) for figure in self.figures]
         return Report(
@@ -151,9 +138,9 @@ def measured(
     quantile
         Quantile of the events for jitter and times, 0.5..1; 1 is the worst one recorded.
     channel
-        Of a log of several channels, the name of the one that is compared.
+        Name of the channel in a log of several.
     progress
-        Called with the bytes read and the size of the file [bytes].
+        Function called with the bytes read and the size of the file [bytes].
 
     Returns
     -------

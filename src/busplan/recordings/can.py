@@ -1,4 +1,4 @@
-"""Frames of CAN logs as arrays, with the bits that each had on the wire."""
+"""Frames of CAN logs as arrays, each with its bits on the wire."""
 
 import logging
 import os
@@ -28,22 +28,22 @@ _ROW: Final = Struct("<dIQBB")
 _ROW_FIELDS: Final = np.dtype(
     [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
 )
-"""Row of a frame while a log is read."""
+"""Data type of a frame while a log is read."""
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader"}
-"""Readers of python-can, by the first bytes of a file; any other text is taken for that of candump."""
+"""Readers of python-can by the first bytes of a file. Any other text is read as candump's."""
 _FORMATS: Final = "text of candump, Vector's ASC and BLF, PEAK's TRC, captures of SocketCAN"
 _LINE: Final = re.compile(
     r"(?:\([ \t]*(?P<stamp>[^\s)]+)\)[ \t]+)?(?P<channel>\S+)[ \t]+(?:(?P<frame>[0-9A-Fa-f]+#\S*)(?: [RT])?|"
     r"(?:[RT]X (?P<switch>[B-]) [E-] +)?(?P<identifier>[0-9A-F]{3}|[0-9A-F]{8}) +\[(?P<size>\d{1,2})\] *"
     r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *'.*')?)"
 )
-"""A line of `candump -l`, or of what candump shows on a terminal."""
+"""Line of `candump -l`, or of candump's output on a terminal."""
 _CLASSICAL_SIZE: Final = 1
-"""Digits of the size of a classical frame on a terminal; that of an FD frame has two."""
+"""Digits of a classical frame's size on a terminal; an FD frame has two."""
 _ERROR_FRAME: Final = "20000080"
 """Identifier of an error frame in `candump -l`."""
 _PACKET: Final = Struct(">IBB2x")
-"""Identifier with its flags, size, and flags of CAN FD of a frame of SocketCAN."""
+"""SocketCAN's head of a frame: identifier with its flags, size, and flags of CAN FD."""
 _ERROR_FLAG, _REMOTE_FLAG, _EXTENDED_FLAG = 1 << 29, 1 << 30, 1 << 31
 _SWITCHED_FLAG, _FD_FLAG = 1, 4
 _FD_PACKET_BYTES: Final = 72
@@ -52,10 +52,10 @@ _REPORT_EVERY: Final = 5000
 _CRC_15: Final = 0x4599
 _CRC_BITS: Final = 15
 _NEVER_STUFFED: Final = 13
-"""Bits after the CRC: its delimiter, acknowledge, end of frame and interframe space."""
+"""Bits after the CRC: its delimiter, acknowledge, end of frame and interframe space [bits]."""
 _RUN: Final = 5
 """Equal bits after which the opposite one is stuffed."""
-_PIECE: Final = 50_000  # frames whose stuff bits are counted at once
+_PIECE: Final = 50_000  # Frames whose stuff bits are counted at once.
 _CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
 """Bytes of the DLC values 10 to 15, as python-can gives `dlc`, even for classical frames, which have 8 bytes."""
@@ -69,11 +69,11 @@ _SHOWN_CHANNELS: Final = 8
 _SHOWN_NAME: Final = 40
 _DAY_S: Final = 86_400.0
 _LONGEST_S: Final = _DAY_S
-"""Longest time from a frame to the next in an undamaged log [s]."""
+"""Time from a frame to the next in an undamaged log, at most [s]."""
 _END_S: Final = float(1 << 33)
-"""Stamps from here on, in the year 2242, are damage [s]."""
+"""First stamp that is damage, in the year 2242 [s]."""
 _MOST_CONTAINER_BYTES: Final = 16_000_000
-"""Most data of a BLF container; Vector's and python-can's have 131,072 bytes."""
+"""Largest data of a BLF container [bytes]; Vector's and python-can's have 131,072."""
 _BLF_OBJECT: Final = Struct("<4s4xII")
 """Header of an object as python-can reads it: signature, size and kind."""
 _BLF_METHOD: Final = Struct("<H14x")
@@ -84,9 +84,9 @@ class CanFrames(NamedTuple):
     """Frames of one channel, n of them in the order of the log."""
 
     start_s: float
-    """Stamp of the first frame, in seconds since 1970 where the log says it."""
+    """Stamp of the first frame [s], since 1970 if the log says so."""
     times_us: Floats
-    """Stamps from the first one on [us]."""
+    """Stamps after the first one [us]."""
     identifiers: npt.NDArray[np.int64]
     extended: npt.NDArray[np.bool_]
     sizes: npt.NDArray[np.int64]
@@ -94,35 +94,24 @@ class CanFrames(NamedTuple):
     bits: npt.NDArray[np.int64]
     """Bits on the wire, interframe space included; 0 for a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
-    """Whether it is a CAN FD frame."""
+    """Whether the frame is one of CAN FD."""
     switched: npt.NDArray[np.bool_]
     """Whether its data are at the data bit rate (BRS)."""
     remote: int
     errors: int
-    """Number of remote frames, which are among the n, and of error frames, which are not."""
+    """Number of error frames, which are not among the n. Remote frames are."""
     broken: str
-    """Why the log ends early; empty for a whole one."""
+    """Reason why the log ends early; empty for a whole one."""
     synthetic: str = ""
-    """What the log says of an emulation; empty where it says of none."""
+    """Words of the log on its emulation; empty without them."""
 
 
 def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> CanFrames:
-    """Read a CAN log.
+    """Read a log of candump, ASC, BLF or TRC, or a capture of SocketCAN.
 
-    Parameters
-    ----------
-    path
-        A log of candump, ASC, BLF or TRC, or a capture of SocketCAN.
-    channel
-        Of several channels, the name of the one that is read.
-    progress
-        Called with the bytes read and the size of the file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        The file cannot be read, is of no known format, has no frame, has frames of several channels and none is named,
-        or none of the one that is named; or python-can is not installed.
+    `channel` names the one to read of several; progress is called with the bytes read and the size of the file [bytes].
+    BusplanError: the file cannot be read, is of no known format or has no frame; it has frames of several channels and
+    none is named, or none of the named one; or python-can is not installed.
     """
     require_regular(path)
     try:
@@ -141,7 +130,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
     require_extra("can", extra="import", option=str(path), module="can")
     import can  # noqa: PLC0415 - an extra
 
-    # Hide its warnings of frames that it skips: they are missing in the figures.
+    # Hide its warnings about skipped frames, which are then missing in the figures.
     logging.getLogger("can").addHandler(logging.NullHandler())
     name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
     try:
@@ -216,7 +205,7 @@ class _CandumpText(_Lines):
 
 
 class _CapturedFrame(NamedTuple):
-    """A frame of a capture, as python-can has them."""
+    """A frame of a capture, with the attributes of python-can's."""
 
     timestamp: float
     channel: int
@@ -231,7 +220,7 @@ class _CapturedFrame(NamedTuple):
 
 
 def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_CapturedFrame]:
-    """Frames of a capture of SocketCAN."""
+    """Frames of a SocketCAN capture."""
     notes = CaptureNotes()
     for piece in packets(path, notes, link=SOCKETCAN, progress=progress):
         content = piece.content.tobytes()
@@ -260,11 +249,11 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_Captured
 
 
 class _DamageError(Exception):
-    """A log has something that no bus sends; the text says what."""
+    """Damage: something in a log that no bus sends, named by the text."""
 
 
 def _bounded_blf() -> Any:
-    """The BLF reader of python-can, with a bound on the inflated size of a container."""
+    """BLF reader of python-can, with a bound on the inflated size of a container."""
     from can.io import blf  # noqa: PLC0415 - as above
 
     class Reader(blf.BLFReader):  # type: ignore[misc,unused-ignore]
@@ -284,7 +273,7 @@ def _bounded_blf() -> Any:
 
 
 def _inflated(content: bytes, *, held: int) -> bytes:
-    """Data of a container; with the `held` bytes of the container before they must not exceed the bound."""
+    """Data of a container; with the `held` bytes of the one before they must not exceed the bound."""
     (method,), data = _BLF_METHOD.unpack_from(content), content[_BLF_METHOD.size :]
     if method == 0:
         return data
@@ -309,7 +298,7 @@ class _Log:
         self.broken = self.synthetic = ""
 
     def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
-        """Take all messages in."""
+        """Store all messages."""
         number, last_s = 0, None
         for message in messages:
             number += 1
@@ -329,7 +318,7 @@ class _Log:
             if self._channel not in (None, str(message.channel)):
                 continue
             is_fd = message.is_fd
-            # CAN FD has no remote frames: one that a log marks so is a data frame whose data the log lost.
+            # CAN FD has no remote frames. One that a log marks so is a data frame whose data the log lost.
             is_remote = message.is_remote_frame and not is_fd
             is_switched = is_fd and message.bitrate_switch
             self._rows += _ROW.pack(
@@ -387,7 +376,7 @@ def _shown(channel: object) -> str:
 def _require_frame(message: Any, before_s: float | None) -> None:
     """Raise for a message that cannot be a frame, before any of it is stored."""
     stamp_s, identifier = message.timestamp, message.arbitration_id
-    if not 0 <= stamp_s < _END_S:  # refuses NaN, too
+    if not 0 <= stamp_s < _END_S:  # NaN is refused, too.
         raise _DamageError(f"a stamp of {stamp_s:g} s")
     if before_s is not None and stamp_s - before_s > _LONGEST_S:
         raise _DamageError(f"a stamp {(stamp_s - before_s) / _DAY_S:,.1f} days after the one before")
@@ -405,15 +394,10 @@ def written_bits(
     sizes: npt.NDArray[np.int64],
     data: npt.NDArray[np.uint64],
 ) -> npt.NDArray[np.int64]:
-    """Bits of frames on the wire, each with its own stuff bits, interframe space included.
+    """Bits of n frames on the wire, each with its own stuff bits, interframe space included [bits].
 
-    Parameters
-    ----------
-    identifiers, extended, remote, sizes
-        Of n frames: identifier, whether it has 29 bits, whether it is a remote frame, and the DLC, 0..15; above 8 it
-        means 8 bytes.
-    data
-        Up to 8 bytes of each, the first byte in the highest bits.
+    `extended` frames have 29-bit identifiers. `sizes` are DLC values 0..15; above 8 they mean 8 bytes. `data` has up to
+    8 bytes of each frame, the first one in the highest bits.
 
     References
     ----------
@@ -446,7 +430,7 @@ def _columns(
     is_remote: bool,
     size: int,
 ) -> list[npt.NDArray[np.uint8]]:
-    """Bits of frames of one kind from the start of frame to the data, an array for each bit over all frames."""
+    """Bits of frames of one kind from the start of frame to the data, as one array over all frames for each bit."""
 
     def constant(*bits: int) -> list[npt.NDArray[np.uint8]]:
         return [np.full(len(identifiers), bit, dtype=np.uint8) for bit in bits]
@@ -466,7 +450,7 @@ def _columns(
 
 
 def _stuffed(columns: list[npt.NDArray[np.uint8]]) -> npt.NDArray[np.int64]:
-    """Number of bits of frames with CRC, stuff bits and all that follows."""
+    """Lengths of frames with CRC, stuff bits and all bits after them [bits]."""
     register = np.zeros(len(columns[0]), dtype=np.int32)
     for bit in columns:
         register = (register << 1 & 0x7FFF) ^ (register >> 14 ^ bit) * _CRC_15

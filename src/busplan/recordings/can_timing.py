@@ -1,4 +1,4 @@
-"""Timing of a CAN log: its clock, the frames of each identifier, event models, and the least possible bit rate."""
+"""Timing of a CAN log: clock, frames of each identifier, event models, and least possible bit rate."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
@@ -13,33 +13,33 @@ from busplan.recordings.can import CanFrames
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, periodic_events
 
 LISTED: Final = 6
-"""Most identifiers that a sentence lists."""
+"""Identifiers that a sentence lists, at most."""
 MOST_BIT_RATE: Final = 1000.0
 """Highest bit rate of classical CAN [kbit/s]."""
 _WINDOWS: Final = (10, 20, 30)
-"""Numbers of frames over which stamps show a bit rate: over only two, errors of stamps dominate."""
+"""Numbers of frames over which stamps show a bit rate. Over two, errors of stamps dominate."""
 _LATE_SHARE: Final = 0.05
-"""Relative excess over the highest bit rate at which a driver must have read several frames at once."""
+"""Relative excess over the highest bit rate at which a driver must have read several frames at once [1]."""
 _LATEST_US: Final = 1000.0
-"""Largest delay of a stamp by a driver that reads several frames at once; with more, stamps are not of a bus [us]."""
+"""Largest delay of a stamp by a driver that reads several frames at once [us]. Later stamps are not those of a bus."""
 _LATE_US: Final = 100.0
 """Largest delay of a stamp by a driver that reads each frame by itself [us]."""
 _LEAST_US: Final = 1e-3
 _FEW: Final = 3
 _STEP_BACK_US: Final = -1000.0
-"""A stamp further before its predecessor means another queue, another clock, or one that was set back [us]."""
+"""Step between stamps below which the next one is of another queue or clock, or of a clock that was set back [us]."""
 _QUEUED_US: Final = 0.5e6
-"""Longest that queues of a recorder hand their frames over one after the other [us]."""
+"""Longest time for which a recorder's queues deliver their frames one after the other [us]."""
 _SEVERAL: Final = 3
-"""Steps back from which on they are not a clock that was set back."""
+"""Number of steps back from which they do not come from a clock that was set back."""
 WINDOW_US: Final = 1e6
 """Window of the fullest second [us]."""
 _PERIODIC: Final = 0.15
-"""Largest standard deviation of a periodic message, as a share of its period."""
+"""Standard deviation of a periodic message, at most, as a share of its period [1]."""
 _MISSING: Final = 0.1
-"""Most periods without a frame of a periodic message, as a share of its frames."""
+"""Periods of a periodic message without a frame, at most, as a share of its frames [1]."""
 _ROUNDING: Final = 1e-9
-"""Share of a period by which float rounding may lengthen a sum of periods."""
+"""Share of a period by which float rounding may lengthen a sum of periods [1]."""
 
 
 class SentFrames(NamedTuple):
@@ -51,15 +51,15 @@ class SentFrames(NamedTuple):
     times_us: Floats
     most_bytes: int
     is_fd: bool
-    """Whether any of them is a CAN FD frame."""
+    """Whether any of the frames is one of CAN FD."""
     switches: bool
-    """Whether all of its CAN FD frames have their data at the data bit rate (BRS)."""
+    """Whether all CAN FD frames have their data at the data bit rate (BRS)."""
     periods: PeriodicEvents | None
-    """Its periods; None for a message that is not periodic."""
+    """Periods of the message; None if it is not periodic."""
 
     @property
     def mean(self) -> Quantile:
-        """Mean distance of its frames, two or more; of a periodic message its period, lost frames counted [us]."""
+        """Mean distance of two or more frames [us]; for a periodic message its period, lost frames counted."""
         span_us = float(self.times_us[-1] - self.times_us[0])
         if self.periods is None:
             return Quantile(span_us / (len(self.times_us) - 1), None)
@@ -69,32 +69,24 @@ class SentFrames(NamedTuple):
 def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
     """Mean period from the first event to the last, with its standard uncertainty [us].
 
-    The lateness of the first and the last differs by no more than the range over all events.
+    The first and the last event differ in lateness by no more than the range over all events.
     """
     number = int(periods.places[-1])
     return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)
 
 
 class EventModel(NamedTuple):
-    """A message as a profile plans it: at most burst - 1 + ceil((w + jitter) / period) frames in a time w."""
+    """A message as planned in a profile: at most burst - 1 + ceil((w + jitter) / period) frames in a time w."""
 
     burst: int
     jitter_us: float
 
 
 def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, tolerance: float) -> EventModel:
-    """The event model of a period with the least burst or jitter that allows the recorded frames.
+    """Event model of a period [us] with the least burst or jitter that allows frames at ascending times [us].
 
-    Parameters
-    ----------
-    times_us
-        Ascending times, n of them [us].
-    period_us
-        The period [us].
-    stamp_error_us
-        Largest error of a stamp [us].
-    tolerance
-        Largest relative error of the clocks, which may shorten the period.
+    `stamp_error_us` is the largest error of a stamp; `tolerance` is the largest relative error of the clocks, which may
+    shorten the period.
 
     Examples
     --------
@@ -114,32 +106,28 @@ def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, to
 
 
 class ClockStretch(NamedTuple):
-    """The longest part of a log in which its clock was not set back."""
+    """Longest part of a log in which its clock was not set back."""
 
     taken: npt.NDArray[np.int64]
-    """Indexes of its frames in the log, in the order of their stamps."""
+    """Indexes of the frames in the log, in the order of their stamps."""
     times_us: Floats
-    """Their stamps, ascending [us]."""
+    """Stamps of the frames, ascending [us]."""
     steps_back: int
-    """Number of times that the clock was set back in the whole log [1]."""
+    """Number of times that the clock was set back in the whole log."""
     sorted_us: float = 0.0
-    """How far frames were out of order, where they are sorted [us]."""
+    """Time by which frames were out of order, before they were sorted [us]."""
 
     @property
     def length_us(self) -> float:
-        """From its first stamp to its last [us]."""
+        """Time from the first stamp to the last [us]."""
         return float(self.times_us[-1] - self.times_us[0])
 
 
 def longest_stretch(frames: CanFrames) -> ClockStretch:
-    """The longest part in which the clock was not set back.
+    """Longest part of a log in which the clock was not set back.
 
-    Small steps back are frames from different queues, which are sorted, however often.
-
-    Raises
-    ------
-    BusplanError
-        The stamps are those of two clocks.
+    Small steps back, however many, come from frames of different queues, which are sorted. Stamps of two clocks raise
+    BusplanError.
     """
     apart_us = np.diff(frames.times_us)
     back_us = -apart_us[apart_us < _STEP_BACK_US]
@@ -184,7 +172,7 @@ def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tu
 
 
 def _is_periodic(periods: PeriodicEvents, length_us: float) -> bool:
-    """Whether events come once a period, for a second or for all of a shorter log: a short row of them is a burst."""
+    """Whether events come once a period for a second, or all of a shorter log. A short row of them is a burst."""
     late_us, rows_us = float(np.std(periods.late_us)), (float(periods.places[-1]) + 1) * periods.period_us
     is_row = rows_us >= min(WINDOW_US, (1 - _MISSING) * length_us)
     is_even = late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
@@ -194,10 +182,7 @@ def _is_periodic(periods: PeriodicEvents, length_us: float) -> bool:
 def fullest_load(times_us: Floats, wire_us: Floats) -> float:
     """Load of the fullest second, or of all of a shorter log, whose first frame ended with its stamp [1].
 
-    Parameters
-    ----------
-    times_us, wire_us
-        Ascending stamps, not all alike, and the time on the wire, of n frames [us].
+    Of n frames, stamps are ascending and not all alike, and `wire_us` are the times on the wire [us].
 
     Examples
     --------
@@ -215,9 +200,9 @@ def fullest_load(times_us: Floats, wire_us: Floats) -> float:
 
 
 def step_us(stretch: ClockStretch) -> float:
-    """Step of the stamps, which logs write in microseconds: the greatest common divisor of their distances [us].
+    """Step of the stamps, which logs write in microseconds: greatest common divisor of their distances [us].
 
-    One or two different distances, none of them 0, show no step, but exactly periodic frames: the step is then 1 us.
+    One or two different distances, none of them 0, show exactly periodic frames but no step, which is then 1 us.
     """
     apart_us = np.unique(np.diff(np.rint(stretch.times_us).astype(np.int64)))
     if len(apart_us) < _FEW and apart_us.all():
@@ -226,18 +211,18 @@ def step_us(stretch: ClockStretch) -> float:
 
 
 class LeastBitRate(NamedTuple):
-    """Lower bounds on the bit rate of the bus [kbit/s]."""
+    """Lower bounds of the bus's bit rate [kbit/s]."""
 
     likely: float
-    """If stamps are as late as with most drivers."""
+    """Bound for stamps as late as with most drivers."""
     surely: float
-    """If stamps may be a millisecond late."""
+    """Bound for stamps up to a millisecond late."""
 
 
 def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
-    """The least possible bit rate of the bus, since frames do not overlap; 0 for too few frames.
+    """Least possible bit rate of the bus, since frames do not overlap; 0 for too few frames.
 
-    Frames are stamped at their ends or, by some controllers, at their starts: in either case at least the smaller sum
+    Frames are stamped at their ends or, by some controllers, at their starts. In either case at least the smaller sum
     of bits lies between two stamps. A stamp may be wrong by its step and by the delay of a driver: where frames come
     closer than on any bus, a driver read several at once, and the first stamp is late by as much as they take.
     """
@@ -263,7 +248,7 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:
-    """Why a least bit rate shows that stamps are not those of a bus; empty where they may be."""
+    """Reason why a least bit rate shows stamps of no bus; empty where they may be of one."""
     if bit_rate_kbit_s <= MOST_BIT_RATE:
         return ""
     return (

@@ -1,6 +1,6 @@
 """Packets of pcap and pcapng files, in pieces, with exact stamps.
 
-Libraries such as dpkt give stamps of pcapng as floats, whose steps are 240 ns by now: more than the jitter of a good
+Libraries such as dpkt give stamps of pcapng as floats, whose steps are 240 ns by now, more than the jitter of a good
 master. So the few fields of a record are read here.
 """
 
@@ -23,27 +23,27 @@ from busplan.recordings.written import SYNTHETIC
 Numbers = npt.NDArray[np.int64]
 _PIECE_BYTES: Final = 4_000_000
 _MOST_RECORD_BYTES: Final = 1_000_000
-"""Longest undamaged record; a packet has 262,144 bytes at most."""
+"""Longest undamaged record [bytes]; a packet has 262,144 at most."""
 ETHERNET, SOCKETCAN = 1, 227
 _LINKS: Final = {ETHERNET: "Ethernet", SOCKETCAN: "SocketCAN"}
-"""Link types."""
+"""Names of link types."""
 _NS: Final = 1_000_000_000
 _END_NS: Final = (1 << 33) * _NS
-"""Stamps from here on, in the year 2242, are damage [ns]."""
+"""First stamp that is damage, in the year 2242 [ns]."""
 _LONGEST_NS: Final = 86_400 * _NS
-"""Longest time from one packet to the next in an undamaged file: a day [ns]."""
+"""Time from one packet to the next in an undamaged file, at most: a day [ns]."""
 _PCAP: Final = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
     b"\x4d\x3c\xb2\xa1": ("<", 1),
     b"\xa1\xb2\x3c\x4d": (">", 1),
 }
-"""Byte order, and the nanoseconds of a tick, by the first bytes of a pcap file."""
+"""Byte order, and duration of a tick [ns], by the first bytes of a pcap file."""
 _SECTION: Final = b"\x0a\x0d\x0d\x0a"
 _ORDER: Final = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
 _INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _STATISTICS, _PACKET = 1, 2, 3, 5, 6
 _COMMENT, _RESOLUTION, _OFFSET = 1, 9, 14
-"""Options: comment of a section; of an interface the tick of its stamps, and the seconds to add."""
+"""Options: comment of a section; tick of an interface's stamps, and seconds to add to them."""
 _DROPPED: Final = {_PACKET: (4,), _STATISTICS: (5, 7)}
 """Options of a block that count dropped packets: before a packet; by the interface, and by the operating system."""
 _MOST_WORDS: Final = 200
@@ -53,30 +53,30 @@ _NOT_COUNTED: Final = 0xFFFF
 
 
 class CapturedPackets(NamedTuple):
-    """Some packets of a capture, in the order of the file."""
+    """Packets of a capture, in the order of the file."""
 
     content: npt.NDArray[np.uint8]
     starts: Numbers
-    """Offset of each in `content`."""
+    """Offset of each packet in `content`."""
     sizes: Numbers
-    """Recorded size of each [bytes]."""
+    """Recorded size of each packet [bytes]."""
     times_ns: Numbers
     """Stamps since 1970 [ns]."""
 
 
 @dataclass
 class CaptureNotes:
-    """What a file has in addition to its packets."""
+    """Facts on a capture besides its packets: counts, marks and damage."""
 
     packets: int = 0
     left_out: int = 0
     """Packets of interfaces of another link type, without a stamp, or with a damaged one."""
     dropped: int = 0
-    """Packets that the recorder says it dropped; a pcap file does not count them."""
+    """Packets that the recorder reports as dropped; a pcap file does not count them."""
     interfaces: set[int] = field(default_factory=set)
-    """Numbers of the interfaces of a pcapng file that its packets are of."""
+    """Interfaces with packets in a pcapng file, by number."""
     synthetic: str = ""
-    """What its comment, or its frames, say of an emulation; empty where it is of a machine."""
+    """Words of the file's comment or frames on its emulation; empty for a recording of a machine."""
     broken_at: int | None = None
     """Offset of the damage in the file, from which nothing is read; None for a whole file."""
     is_long: bool = False
@@ -93,23 +93,10 @@ def is_capture(head: bytes) -> bool:
 
 
 def packets(path: Path, notes: CaptureNotes, *, link: int = ETHERNET, progress: Progress) -> Iterator[CapturedPackets]:
-    """Packets of a capture, in pieces.
+    """Packets of one link type in a pcap or pcapng file, in pieces.
 
-    Parameters
-    ----------
-    path
-        A pcap or pcapng file.
-    notes
-        Counts of what is left out, filled in as the file is read.
-    link
-        Link type of the packets that are read.
-    progress
-        Called with the bytes read and the size of the file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        The file cannot be read, or is no such file.
+    Counts of packets left out go to the notes as the file is read; progress is called with the bytes read and the size
+    of the file [bytes]. A file that cannot be read, or is of another format, raises BusplanError.
     """
     require_regular(path, or_written_pipe=True)
     try:
@@ -199,7 +186,7 @@ class _Pcap(_Walker):
 class _Interface(NamedTuple):
     link: int
     ticks: int
-    """Ticks of its stamps in a second."""
+    """Ticks of the stamps in a second."""
     offset_ns: int
 
 
@@ -207,7 +194,7 @@ class _PcapNg(_Walker):
     _order: str
     _head: Struct
     _fields: Struct
-    """Byte order of the section; in it, the head of a block (kind, size) and the fields of a packet."""
+    """Structs in the section's byte order: head of a block (kind, size), and fields of a packet."""
 
     def __init__(self, notes: CaptureNotes, link: int) -> None:
         self._notes, self._link = notes, link
@@ -255,7 +242,7 @@ class _PcapNg(_Walker):
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : end]))
         elif kind == _STATISTICS:
-            # A block of statistics counts all drops of its interface so far, also those that packets have counted.
+            # A block of statistics counts all drops of its interface so far, those already counted by packets included.
             notes.dropped = max(notes.dropped, self._dropped(content[at + 20 : end], _STATISTICS))
 
     def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
@@ -269,7 +256,7 @@ class _PcapNg(_Walker):
         self._notes.left_out += 1
 
     def _dropped(self, options: bytes, kind: int) -> int:
-        """Packets that the options of a block say were dropped."""
+        """Number of dropped packets in the options of a block."""
         number = Struct(f"{self._order}Q")
         return sum(
             number.unpack(value)[0]
@@ -278,7 +265,7 @@ class _PcapNg(_Walker):
         )
 
     def _find_mark(self, options: bytes) -> None:
-        """Note what the comment of a section says of an emulated recording."""
+        """Note the words of a section's comment on an emulated recording."""
         for code, value in self._options(options):
             text = printable(value[:_MOST_WORDS].decode("utf-8", "replace"))
             if code == _COMMENT and text.startswith(f"{SYNTHETIC}:"):

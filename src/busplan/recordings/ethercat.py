@@ -1,4 +1,4 @@
-"""EtherCAT frames of a capture: their stamps, datagrams and working counters, as arrays."""
+"""EtherCAT frames of a capture: stamps, datagrams and working counters, as arrays."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +19,7 @@ _VLAN: Final = (0x8100, 0x88A8)
 _DATAGRAMS: Final = 1
 """Type in the EtherCAT header of a frame of datagrams."""
 _DEVICES_BIT: Final = 0x02
-"""Bit of the source address that devices set in a frame that returns."""
+"""Bit of the source address that devices set in a frame on its way back."""
 LOGICAL: Final = {10: "LRD", 11: "LWR", 12: "LRW"}
 COMMANDS: Final = {
     **LOGICAL,
@@ -29,13 +29,13 @@ COMMANDS: Final = {
 }
 _FIELD_BYTES: Final = 7
 """Bytes that describe a datagram: command + 1 (0 where there is no datagram), logical address, size."""
-_OVERHEAD_BYTES: Final = 12  # header, 10, and working counter, 2
+_OVERHEAD_BYTES: Final = 12  # Header of 10 bytes, and working counter of 2.
 _APRD, _FPRD, _BRD, _BWR = 1, 4, 7, 8
 _PORT_TIMES: Final = range(0x0900, 0x0910)
 """Registers of the receive times of ports 0 to 3, 4 bytes each (ETG.1000.4, distributed clocks)."""
 _PORTS: Final = 4
 _HEAD: Final = Struct("<BBHHH")
-"""Command, index, address of the device, register, and size with its flags."""
+"""Head of a datagram: command, index, address of the device, register, and size with its flags."""
 
 
 class Datagram(NamedTuple):
@@ -48,7 +48,7 @@ class Datagram(NamedTuple):
 
     @property
     def is_logical(self) -> bool:
-        """Whether it has a logical address: that of process data, or of a read of the master's own."""
+        """Whether the datagram has a logical address, as for process data or for the master's own reads."""
         return self.command in LOGICAL
 
 
@@ -56,9 +56,9 @@ class Latch(NamedTuple):
     """A broadcast write at which every device latches the receive times of its ports, and the times read after it."""
 
     devices: int
-    """Number of devices that the write passed: each adds 1 to its address."""
+    """Number of devices that the write passed. Each adds 1 to its address."""
     ports_ns: dict[tuple[int, int], dict[int, int]]
-    """By command and address of the read: receive time of each port, by its number; modulo 2^32 [ns]."""
+    """Receive times of ports by number, modulo 2^32 [ns], by command and address of the read."""
 
 
 class EthercatFrames(NamedTuple):
@@ -68,15 +68,15 @@ class EthercatFrames(NamedTuple):
     returned: npt.NDArray[np.bool_]
     """Whether the frame had passed a device, which sets a bit of its source address."""
     layout: Numbers
-    """Index of its datagrams in `layouts`."""
+    """Index in `layouts` of the frame's datagrams."""
     key: Numbers
-    """Key of its datagrams, their indexes included: a frame returns with the key that it was sent with."""
+    """Key of the datagrams with their indexes. A frame returns with the key with which it was sent."""
     counters: Numbers
-    """Key of its working counters: frames with the same counters have the same key."""
+    """Key of the working counters. Frames with the same counters have the same key."""
     layouts: tuple[tuple[Datagram, ...], ...]
     notes: CaptureNotes
     others: int
-    """Number of packets that are no EtherCAT frame of datagrams."""
+    """Number of packets that are not EtherCAT frames of datagrams."""
     cut: int
     """Number of EtherCAT frames that the recorder cut."""
     latches: tuple[Latch, ...]
@@ -86,19 +86,10 @@ class EthercatFrames(NamedTuple):
 
 
 def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
-    """Read the EtherCAT frames of a capture.
+    """Read the EtherCAT frames of a pcap or pcapng file.
 
-    Parameters
-    ----------
-    path
-        A pcap or pcapng file.
-    progress
-        Called with the bytes read and the size of the file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        The file cannot be read, has no EtherCAT frame, has frames of several masters, or does not tell sent frames.
+    Progress is called with the bytes read and the size of the file [bytes]. BusplanError: the file cannot be read, has
+    no EtherCAT frame, has frames of several masters, or does not tell sent frames from returned ones.
     """
     notes, reader = CaptureNotes(), _Reader()
     for piece in packets(path, notes, progress=progress):
@@ -107,7 +98,7 @@ def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
 
 
 class _Reader:
-    """Frames of all pieces so far."""
+    """Frames of the pieces read so far."""
 
     def __init__(self) -> None:
         self._parts: list[tuple[npt.NDArray[np.generic], ...]] = []
@@ -120,9 +111,9 @@ class _Reader:
         self._latches: list[Latch] = []
 
     def read(self, piece: CapturedPackets) -> None:
-        """Take a piece in."""
+        """Read a piece."""
         content, ends = piece.content, piece.starts + piece.sizes
-        # Zeros after the end, so that a header can be read before it is known to be whole.
+        # Zeros after the end let a header be read before it is known to be whole.
         content = np.concatenate((content, np.zeros(64, dtype=np.uint8)))
         at = piece.starts + 12
         kind = _word(content, at)
@@ -158,7 +149,7 @@ class _Reader:
             self._masters[int(value)] = self._masters.get(int(value), 0) + int(count)
 
     def _port_times(self, datagram: npt.NDArray[np.uint8]) -> None:
-        """Take in a returned datagram that reads or latches port receive times."""
+        """Read a returned datagram that reads or latches port receive times."""
         command, _, address, register, size = _HEAD.unpack(datagram[: _HEAD.size].tobytes())
         size &= 0x7FF
         if command == _BWR:
@@ -185,7 +176,7 @@ class _Reader:
         self._layout_of_key.append(self._layouts.setdefault(layout, len(self._layouts)))
 
     def frames(self, path: Path, notes: CaptureNotes) -> EthercatFrames:
-        """All frames."""
+        """Frames of all pieces."""
         if not self._parts:
             cut = f", {self._cut:,} of them cut: record whole packets" if self._cut else ""
             raise BusplanError(
@@ -233,9 +224,9 @@ def _word(content: npt.NDArray[np.uint8], at: Numbers) -> Numbers:
 def _datagrams(
     content: npt.NDArray[np.uint8], at: Numbers, ends: Numbers
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.uint8], npt.NDArray[np.uint8], list[tuple[int, int]]]:
-    """Whether each frame is whole; index, command, address and size of its datagrams; and their working counters.
+    """Wholeness of each frame; index, command, address and size of its datagrams; and its working counters.
 
-    The fourth result: frame and offset of each datagram on port receive times.
+    The fourth result has frame and offset of each datagram on port receive times.
     """
     whole, walking = np.ones(len(at), dtype=np.bool_), np.ones(len(at), dtype=np.bool_)
     last = len(content) - 16
@@ -269,16 +260,10 @@ def _datagrams(
 
 
 def _row_numbers(rows: npt.NDArray[Any], numbers: dict[bytes, int], on_new: Callable[[bytes], None]) -> Numbers:
-    """Number of each row of bytes: equal rows have the same number, and new rows get the next ones.
+    """Numbers of rows of bytes, of shape (n, width). Equal rows have the same number, and new rows get the next ones.
 
-    Parameters
-    ----------
-    rows
-        Rows of bytes, of shape (n, width).
-    numbers
-        Number by the bytes of a row, over all pieces of a file; new rows are added.
-    on_new
-        Called with the bytes of each new row, in the order of their numbers.
+    `numbers`, by the bytes of a row, keeps them over all pieces of a file. `on_new` is called with each new row, in the
+    order of the numbers.
     """
     flat = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.shape[1]))).ravel()
     unique, inverse = np.unique(flat, return_inverse=True)

@@ -8,26 +8,26 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 LEAST_EVENTS: Final = 10
-"""Fewest events for a period."""
+"""Events for a period, at least."""
 _BLOCK: Final = 500
 """Events of a block, over which a clock counts as even."""
 _BLOCKS: Final = range(8, 513)
 """Allowed numbers of blocks."""
 _ALONE: Final = 40
-"""With fewer events, each is a block."""
+"""Number of events below which each is a block."""
 _FEW: Final = 6.0
-"""The scatter of n events is enlarged by this / n, as a share: 99.9 % bound for n - 2 degrees of freedom."""
+"""Enlargement of the scatter of n events, times n, as a share: 99.9 % bound for n - 2 degrees of freedom."""
 _LEAST_ERROR_US: Final = 1e-6
 _DRIFT_SIGMAS: Final = 8.0
-"""A clock drifts if the reduced chi-square of the blocks about its line exceeds 1 by so many standard errors."""
+"""Excess of the blocks' reduced chi-square about a line over 1 that shows clock drift [standard errors]."""
 _REACH: Final = 4.0
-"""The most favourable clock is searched within so many standard errors of the period."""
+"""Range about the period in which the most favourable clock is searched [standard errors]."""
 _THIRDS: Final = 25
 """Steps of that search, each to two thirds of the range."""
 _EARLY_SHARE: Final = 0.999
-"""Quantile that counts as the earliest event: the stamps of the few before it may be wrong."""
+"""Quantile that counts as the earliest event; stamps of the few before it may be wrong."""
 _AHEAD: Final = 20
-"""Events after a block that are read, too, so that a late event at its end is seen."""
+"""Events after a block that are also read, so that a late event at its end is seen."""
 _ROUNDING: Final = 1e-6
 """Events by which float rounding may lift a point over a line."""
 _COVERAGE: Final = 2
@@ -39,7 +39,7 @@ class Quantile(NamedTuple):
 
     value: float
     uncertainty: float | None
-    """Standard uncertainty; None where too few values lie beyond the quantile, such as the largest."""
+    """Standard uncertainty; None where too few values lie beyond the quantile, as for the largest."""
 
 
 class PeriodicEvents(NamedTuple):
@@ -47,29 +47,24 @@ class PeriodicEvents(NamedTuple):
 
     period_us: float
     uncertainty_us: float
-    """Standard uncertainty of the period, from the scatter of the events."""
+    """Standard uncertainty of the period from the scatter of the events [us]."""
     late_us: Floats
-    """Delay of each event against its period, about 0; drift of the clock is removed [us]."""
+    """Delay of each event against its period, about 0, without drift of the clock [us]."""
     doubt_us: float
-    """Standard uncertainty of the delays due to drift of the clock; that of the period is not included [us]."""
+    """Standard uncertainty of the delays due to drift of the clock, without that of the period [us]."""
     places: npt.NDArray[np.int64]
-    """Number of the period of each event, from 0."""
+    """Number of each event's period, from 0."""
 
     @property
     def missing(self) -> int:
-        """Periods without an event."""
+        """Number of periods without an event."""
         return int(self.places[-1]) + 1 - len(self.places)
 
 
 def quantile(values: Floats, share: float) -> Quantile:
-    """The value that a share of the values does not exceed, with the uncertainty due to its rank.
+    """Value that a share 0..1 of one or more values does not exceed, with the uncertainty due to its rank.
 
-    Parameters
-    ----------
-    values
-        Values, n of them, at least one.
-    share
-        The share, 0..1; its rank is rounded up, so the quantile is one of the values.
+    The rank is rounded up, so that the quantile is one of the values.
 
     Examples
     --------
@@ -90,8 +85,8 @@ def quantile(values: Floats, share: float) -> Quantile:
 def lateness(events: PeriodicEvents, share: float) -> Quantile:
     """Delay of a quantile of the events after the earliest [us].
 
-    The period is uncertain: the most favourable one counts, which has the least delay. The uncertainty covers the other
-    periods, and the rank if enough events lie beyond the quantile.
+    The period is uncertain, so the most favourable one counts, which has the least delay. The uncertainty covers the
+    other periods, and the rank if enough events lie beyond the quantile.
     """
     at, early = events.places - float(np.mean(events.places)), max(share, _EARLY_SHARE)
 
@@ -115,7 +110,7 @@ def lateness(events: PeriodicEvents, share: float) -> Quantile:
 
 
 def _ranked(values: Floats, share: float) -> float:
-    """The value that a share of some values does not exceed."""
+    """Value that a share of some values does not exceed."""
     place = _rank(len(values), share) - 1
     return float(np.partition(values, place)[place])
 
@@ -125,14 +120,9 @@ def _rank(count: int, share: float) -> int:
 
 
 def periodic_events(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | None:
-    """The period of events and the delay of each; None for too few events, or for several at once.
+    """Period of events at ascending times [us], and delay of each; None for too few, or for several at once.
 
-    Parameters
-    ----------
-    times_us
-        Ascending times, n of them [us].
-    near_us
-        Estimate of the period [us]; by default the median distance.
+    `near_us` is an estimate of the period; None for the median distance.
 
     Examples
     --------
@@ -154,14 +144,7 @@ def periodic_events(times_us: Floats, near_us: float | None = None) -> PeriodicE
 def ahead(times_us: Floats, period_us: float) -> Floats:
     """Time by which each event comes too early: less than k periods after the event k before it [us].
 
-    The maximum is the least jitter for which the events fit the period.
-
-    Parameters
-    ----------
-    times_us
-        Ascending times, n of them [us].
-    period_us
-        The period [us].
+    Its maximum is the least jitter for which events at ascending times fit the period [us].
 
     References
     ----------
@@ -177,17 +160,11 @@ def ahead(times_us: Floats, period_us: float) -> Floats:
 
 
 def steady_rate(times_us: Floats, window_us: float) -> float:
-    """Slope of the concave hull of the arrival curve at a window: the most events of windows about so long [1/us].
+    """Slope of the arrival curve's concave hull at a window: the most events of windows about so long [1/us].
 
-    The arrival curve is the most events n that come within a time w, anywhere. Of all rates r with the burst b that
-    makes b + r w hold it, this one has the least b + r w at the window. It is 0 where all events come in less time.
-
-    Parameters
-    ----------
-    times_us
-        Ascending times, n of them [us].
-    window_us
-        The window [us].
+    The arrival curve is the largest number n of events within a time w, anywhere; times are ascending [us]. Of all
+    rates r with the burst b for which b + r w bounds the curve, this one has the least b + r w at the window. It is 0
+    if all events come in less time.
 
     References
     ----------
@@ -226,7 +203,7 @@ def steady_rate(times_us: Floats, window_us: float) -> float:
 
 
 def _period(times_us: Floats, period_us: float) -> float:
-    """The period, from medians over ever longer distances: each estimate tells how many periods the next one spans."""
+    """Period from medians over ever longer distances [us]. Each estimate shows how many periods the next one spans."""
     lag = 1
     while period_us > 0:
         lag = min(lag * 8, len(times_us) // 2)
@@ -238,14 +215,14 @@ def _period(times_us: Floats, period_us: float) -> float:
 
 
 def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
-    """Number of the period of each event, from 0, in blocks that follow the drift of the clock."""
+    """Number of each event's period, from 0, in blocks that follow the drift of the clock."""
     places = np.empty(len(times_us), dtype=np.int64)
     planned_us, number = float(times_us[0]), 0
     for first in range(0, len(times_us), _BLOCK):
         some_us = times_us[first : first + _BLOCK + _AHEAD]
         order = np.arange(len(some_us))
         place = np.rint((some_us - planned_us) / period_us).astype(np.int64)
-        # Two events in one period: the first is late by more than half a period and belongs to the period before.
+        # Of two events in one period, the first is late by more than half a period and belongs to the period before.
         place = np.maximum(np.minimum.accumulate((place - order)[::-1])[::-1] + order, order)[:_BLOCK]
         places[first : first + _BLOCK] = number + place
         behind = int(place[-1]) + 1
@@ -255,12 +232,12 @@ def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
 
 
 class _Clock(NamedTuple):
-    """The clock of some events against an ideal clock."""
+    """The clock of some events, compared with an ideal clock."""
 
     at_us: Floats
-    """Its difference at each event [us]."""
+    """Difference at each event [us]."""
     slope_us: float
-    """Its difference per period [us]."""
+    """Difference per period [us]."""
     error_us: float
     """Standard uncertainty of the slope [us]."""
     doubt_us: float
@@ -270,7 +247,7 @@ class _Clock(NamedTuple):
 def _clock(places: Floats, late: Floats) -> _Clock:
     """A line through the means of blocks of events, in several pieces where the clock drifts.
 
-    Outliers are clipped. The scatter is that of consecutive events, which a drift does not change.
+    Outliers are clipped. The scatter is that of consecutive events, which drift does not change.
     """
     count = len(late)
     if count >= _ALONE:
@@ -308,15 +285,9 @@ def _clock(places: Floats, late: Floats) -> _Clock:
 def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | None:
     """Slope of the medians of values over their sizes, with its standard uncertainty; None for fewer than two sizes.
 
-    Sizes with fewer than ten values are left out. Where the medians scatter about the line more than their errors
-    explain, the uncertainty is enlarged by the Birge ratio.
-
-    Parameters
-    ----------
-    sizes, values
-        Size and value of each of n things.
-    doubt
-        Standard uncertainty common to all values of a size, in their unit.
+    Sizes with fewer than ten values are left out. If the medians scatter about the line more than their errors explain,
+    the Birge ratio enlarges the uncertainty. `doubt` is a standard uncertainty common to all values of a size, in their
+    unit.
     """
     rows = []
     for size in np.unique(sizes):
@@ -337,7 +308,7 @@ def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | N
 
 
 def step(times_ns: npt.NDArray[np.int64]) -> float:
-    """Step of the stamps: the greatest common divisor of their distances [us]."""
+    """Step of the stamps: greatest common divisor of their distances [us]."""
     return int(np.gcd.reduce(np.abs(np.diff(times_ns)))) / 1000
 
 

@@ -1,4 +1,4 @@
-"""Writer of recordings that no recorder made: pcapng and text of candump, each marked as synthetic."""
+"""Writer of recordings that no recorder made: pcapng and candump's text, each marked as synthetic."""
 
 from collections.abc import Iterable, Mapping
 from struct import pack
@@ -7,30 +7,23 @@ from typing import Final
 SYNTHETIC: Final = "synthetic"
 """Name of the interface in an emulated recording, and the first word of its comment.
 
-Of a CAN log it is the mark: readers of candump's text, python-can among them, take no comment in it, and all of them
-take any name in each line.
+In a CAN log the name is the mark: readers of candump's text, python-can among them, accept no comment, but any name in
+each line.
 """
 SYNTHETIC_PORT: Final = bytes.fromhex("00005e005301")
 """Source of the frames of an emulated capture: an address for documentation, which no port has (RFC 7042)."""
 _SECTION, _INTERFACE, _PACKET = 0x0A0D0D0A, 1, 6
 _COMMENT, _NAME, _RESOLUTION = 1, 2, 9
-"""Options: comment of any block, name of an interface, and the tick of its stamps."""
+"""Options: comment of any block, name of an interface, and tick of its stamps."""
 _ORDER: Final = 0x1A2B3C4D
 _NANOSECONDS: Final = 9
 _LONGEST_PACKET: Final = 65535
 
 
 def pcapng(packets: Iterable[tuple[int, bytes]], *, link: int, origin: str) -> bytes:
-    """A pcapng file of one interface.
+    """A pcapng file of one interface of some link type, from ascending stamps [ns] and contents.
 
-    Parameters
-    ----------
-    packets
-        Stamps, ascending [ns], and contents.
-    link
-        Link type of the interface.
-    origin
-        What the section's comment says behind "synthetic: ".
+    `origin` follows "synthetic: " in the comment of the section.
 
     References
     ----------
@@ -59,12 +52,7 @@ def _packet(packet: tuple[int, bytes]) -> bytes:
 
 
 def candump(frames: Iterable[tuple[int, str]]) -> bytes:
-    """Text of `candump -l`.
-
-    Parameters
-    ----------
-    frames
-        Stamps [us], and frames as candump writes them.
+    """Text of `candump -l`, from stamps [us] and frames in candump's form.
 
     Examples
     --------

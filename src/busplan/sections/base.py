@@ -1,4 +1,4 @@
-"""Base of all sections of a profile: strictness, ranges, and errors in our own words."""
+"""Base of all sections of a profile: strictness, ranges, and error messages of our own."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self, TypeVar
@@ -20,25 +20,25 @@ Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 
 
 MISSING: Final = "Field required"
-"""Message of a missing key; what reports it says what the key is."""
+"""Message of a missing key; its reporter adds what the key is."""
 
 
 class Problem(NamedTuple):
-    """One thing that is wrong with a profile."""
+    """A problem of a profile."""
 
     message: str
     key: str | None = None
-    """Dotted key it belongs to, below the section that is validated; None for the section itself."""
+    """Dotted key of the problem, below the validated section; None for the section itself."""
     kind: ProblemKind = "out-of-range"
 
 
 def refused(*problems: Problem) -> PydanticCustomError:
-    """Make an error whose words are ours; a validator can report several problems, each with its own key."""
+    """Error with our own words; a validator can report several problems, each with its own key."""
     return PydanticCustomError("busplan", "{text}", {"text": problems[0].message, "problems": problems})
 
 
 def _title(section: type) -> str:
-    """Title a section as its class; a section of a kind of bus as the section that it extends."""
+    """Title of a section: its class; for a section of a kind of bus, the section that it extends."""
     titles = (base.__name__.removesuffix("Section") for base in section.__mro__ if base.__name__.endswith("Section"))
     *_, title = (section.__name__, *filter(None, titles))
     return title
@@ -52,17 +52,17 @@ class Section(BaseModel):
         frozen=True,
         extra="forbid",
         defer_build=True,
-        # Editors show it.
+        # Editors show the title.
         model_title_generator=_title,
     )
 
     def _problems(self) -> Iterator[Problem]:
-        """Tell where values that are right alone do not agree; a section that extends another adds its own."""
+        """Conflicts between values that are each valid; a section that extends another adds its own."""
         yield from ()
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
-        # A class may rely on what those that it extends have checked.
+        # A class may rely on the checks of the classes that it extends.
         for section in reversed(type(self).__mro__):
             if "_problems" in vars(section) and (problems := tuple(vars(section)["_problems"](self))):
                 raise refused(*problems)
@@ -70,34 +70,28 @@ class Section(BaseModel):
 
 
 class Extended(Section):
-    """A section with keys that no type checker sees: those of a kind of bus, or of the servo core."""
+    """A section with keys that a type checker does not see: those of a kind of bus, or of the servo core."""
 
     if TYPE_CHECKING:
 
         def __getattr__(self, key: str) -> Any:
-            """One of those keys."""
+            """Value of such a key."""
 
 
 _Section = TypeVar("_Section", bound=Section)
 
 
 def with_unchecked(section: _Section, key: str, value: object) -> _Section:
-    """Return a copy with a key replaced, unvalidated.
+    """Copy of a section with one key replaced, unvalidated.
 
-    Parameters
-    ----------
-    section
-        The profile, or a section of it.
-    key
-        Dotted key below it; of several tables of a key, the name of the table follows the key.
-    value
-        Anything that computes like a number: an array, or a traced number.
+    The key is dotted and starts below the section; of several tables of a key, the table's name follows the key. The
+    value is anything that computes like a number: an array, or a traced number.
     """
     return with_all_unchecked(section, {key: value})
 
 
 def with_all_unchecked(section: _Section, values: Mapping[str, object]) -> _Section:
-    """Return a copy with several keys replaced, unvalidated: values by dotted key, as `with_unchecked` takes it."""
+    """Copy of a section with several keys replaced, unvalidated; keys are those of `with_unchecked`."""
     new: dict[str, Any] = {}
     for name, below in _by_first_part(values).items():
         inner = getattr(section, name)
@@ -114,7 +108,7 @@ def with_all_unchecked(section: _Section, values: Mapping[str, object]) -> _Sect
 
 
 def _by_first_part(values: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """Values by the rest of their keys, which is empty at the end, by the first part."""
+    """Values by first part of their key, then by the rest of it, which is empty at the end."""
     parts: dict[str, dict[str, object]] = {}
     for key, value in values.items():
         name, _, rest = key.partition(".")
@@ -123,15 +117,7 @@ def _by_first_part(values: Mapping[str, object]) -> dict[str, dict[str, object]]
 
 
 def value_at(section: Section, key: str) -> Any:
-    """The value of a dotted key below a section; None if it has no such key.
-
-    Parameters
-    ----------
-    section
-        The profile, or a section of it.
-    key
-        Dotted key, as `with_unchecked` takes it.
-    """
+    """Value of a dotted key below a section, as `with_unchecked` takes it; None if it has no such key."""
     value: Any = section
     for part in key.split("."):
         value = _by_name(value).get(part) if isinstance(value, tuple) else getattr(value, part, None)
@@ -139,9 +125,11 @@ def value_at(section: Section, key: str) -> Any:
 
 
 _KEPT: Final = 8
-"""Most tuples of tables whose names are kept."""
+"""Tuples of tables whose names are kept, at most."""
 _named: Final[dict[int, tuple[tuple[Any, ...], dict[str, Any]]]] = {}
-"""Tables of a tuple by name, with the tuple, which so keeps its identity: there may be thousands to look up in."""
+"""Tables of a tuple by name, for look-ups among thousands. The tuple is kept with them, so that its identity stays its
+own.
+"""
 
 
 def _by_name(tables: tuple[Any, ...]) -> dict[str, Any]:

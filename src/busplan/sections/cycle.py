@@ -1,4 +1,4 @@
-"""Sections that every kind of bus shares, on the cycle and its nodes: [bus], [cycle], [payload], [node], [[group]].
+"""Sections on the cycle and its nodes, for every kind of bus: [bus], [cycle], [payload], [node], [[group]].
 
 A kind of bus adds its own keys in a class of its own. The limits of its standard are not checked here: a profile that
 breaks them loads, and the analysis says why it does not fit.
@@ -61,9 +61,9 @@ DERIVED_UNCERTAINTY_US: Final = Sourced(
 
 
 def time_uncertainty_us(us: Number, *, is_guess: bool) -> Number:
-    """Standard uncertainty of a time that a machine takes and nobody has measured [us].
+    """Standard uncertainty of a machine's time that nobody has measured [us].
 
-    A guess is between nothing and twice its value; a time that is given is known to 10 %.
+    A guess is between nothing and twice its value; a given time is known to 10 %.
     """
     return choose(is_guess, GUESS_SHARE, UNKNOWN_SHARE) * us
 
@@ -85,19 +85,19 @@ class GradedExecution(Section):
 
     @property
     def covered_bytes(self) -> tuple[float, float]:
-        """The smallest and the largest payload whose execution time is known."""
+        """Smallest and largest payload whose execution time is known [bytes]."""
         return 0, inf
 
     def covers(self, payload_bytes: int) -> bool:
-        """Tell whether the execution time of that payload is known."""
+        """Whether the execution time of a payload is known."""
         least, most = self.covered_bytes
         return least <= payload_bytes <= most
 
     def standard_uncertainty_us(self, execution_us: Number) -> Number:
         """Standard uncertainty u(T_exec) of an execution time [us].
 
-        The key `uncertainty_us`, or by grade: of a measured time 0.1 / sqrt(12), of a derived time 1 / sqrt(3), of
-        an assumed one its value / sqrt(3), else 10 % of it.
+        It is the key `uncertainty_us`, or depends on the grade: 0.1 / sqrt(12) for a measured time, 1 / sqrt(3) for a
+        derived one, T_exec / sqrt(3) for an assumed one, and 10 % of T_exec for others.
         """
         if self.uncertainty_us is not None:
             return self.uncertainty_us
@@ -115,11 +115,11 @@ class LinearExecution(GradedExecution):
 
     @property
     def ascends_from_bytes(self) -> int:
-        """The payload from which on no larger payload takes less time."""
+        """Payload from which no larger one takes less time [bytes]."""
         return 0
 
     def execution_us(self, payload_bytes: Number) -> Number:
-        """Execution time T_exec of a transaction with that payload [us]."""
+        """Execution time T_exec of a transaction [us]."""
         return self.base_us + self.per_byte_us * payload_bytes
 
 
@@ -146,7 +146,7 @@ class TableExecution(GradedExecution):
 
     @property
     def ascends_from_bytes(self) -> int:
-        """The payload from which on no larger payload takes less time."""
+        """Payload from which no larger one takes less time [bytes]."""
         falls = [
             self.payload_bytes[at + 1] for at, (before, after) in enumerate(pairwise(self.time_us)) if after < before
         ]
@@ -154,21 +154,18 @@ class TableExecution(GradedExecution):
 
     @property
     def covered_bytes(self) -> tuple[float, float]:
-        """The smallest and the largest payload whose execution time is known."""
+        """Smallest and largest payload whose execution time is known [bytes]."""
         return self.payload_bytes[0], self.payload_bytes[-1]
 
     @property
     def range_bytes(self) -> str:
-        """The payloads the table covers, in words."""
+        """Range of the table's payloads, in words."""
         return f"{self.payload_bytes[0]} to {self.payload_bytes[-1]} bytes"
 
     def execution_us(self, payload_bytes: Number) -> Number:
-        """Execution time T_exec of a transaction with that payload [us].
+        """Execution time T_exec of a transaction [us].
 
-        Raises
-        ------
-        ValueError
-            The payload lies outside the table (see `covers`): nothing is extrapolated. Arrays are not checked.
+        Nothing is extrapolated: a payload outside the table raises ValueError (see `covers`). Arrays are not checked.
         """
         if isinstance(payload_bytes, int) and not self.covers(payload_bytes):
             raise ValueError(f"{payload_bytes} bytes is outside the execution table, {self.range_bytes}")
@@ -237,15 +234,7 @@ class PayloadSection(Extended):
         return getattr(self, f"{kind}_bytes"), getattr(self, f"{kind}_bytes_per_axis")
 
     def bytes_of(self, kind: TransactionKind, *, axes: Number) -> Number:
-        """Payload of a transaction with a node [bytes].
-
-        Parameters
-        ----------
-        kind
-            "read" or "write".
-        axes
-            Axes of the node; of any sort [1].
-        """
+        """Payload of a transaction with a node of some axes [bytes]."""
         fixed, per_axis = self._parts(kind)
         if per_axis is None:
             return 0 if fixed is None else fixed
@@ -253,12 +242,12 @@ class PayloadSection(Extended):
         return share if fixed is None else fixed + share
 
     def key_of(self, kind: TransactionKind) -> str:
-        """The key that a payload is changed by first: what each axis adds, where it adds something."""
+        """Key by which a payload is changed first: the payload of each axis, where there is one."""
         return f"{kind}_bytes" if self._parts(kind)[1] is None else f"{kind}_bytes_per_axis"
 
     @property
     def follows_axes(self) -> bool:
-        """Whether more axes mean more bytes."""
+        """Whether more axes need more bytes."""
         return any(self._parts(kind)[1] is not None for kind in TRANSACTION_KINDS)
 
 
@@ -288,7 +277,7 @@ class GroupSection(NodeSection, PayloadSection):
     axes: GroupAxes = Field(examples=[4])
 
     may_be_empty: ClassVar[bool] = False
-    """Whether its payloads may have 0 bytes."""
+    """Whether payloads of the group may have 0 bytes."""
 
     def _problems(self) -> Iterator[Problem]:
         for kind in TRANSACTION_KINDS:

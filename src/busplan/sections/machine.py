@@ -1,7 +1,7 @@
-"""The sections that the circle test needs: [servo], [mechanics], [delivery], [circle], [tolerance].
+"""Sections of the circle test: [servo], [mechanics], [delivery], [circle], [tolerance].
 
-All are optional. Zero in a resolution, a lag or `dac_bits` means ideal. Keys that are parameters of the servo core
-take their names, defaults, ranges and descriptions from there.
+All are optional. Zero in a resolution, a lag or `dac_bits` means ideal. Keys that are parameters of the servo core take
+their names, defaults, ranges and descriptions from there.
 """
 
 from collections import Counter
@@ -26,28 +26,28 @@ from busplan.servo.parameters import (
 
 
 class ProfileGroup(NamedTuple):
-    """Nodes of a profile that are alike: those of a section [[group]], or of [node] and [payload]."""
+    """Alike nodes of a profile: those of a section [[group]], or of [node] and [payload]."""
 
     name: str
     """Name of the group; empty for the nodes of [node]."""
     nodes: Any
     """Number of nodes [1]."""
     node: Any
-    """A node of the group, of its kind's own model: how it executes and answers."""
+    """A node of the group, by its kind's own model: execution time and answer."""
     payload: Any
-    """Payloads of a node, of its kind's own model."""
+    """Payloads of a node, by its kind's own model."""
 
     @property
     def nodes_key(self) -> str:
-        """Dotted key of their number."""
+        """Dotted key of the number of nodes."""
         return f"group.{self.name}.nodes" if self.name else "bus.nodes"
 
     def node_key(self, key: str) -> str:
-        """Dotted key of a node's value in the profile, as of "execution.base_us"."""
+        """Dotted key of a node's value in the profile, for a key below the node, as "execution.base_us"."""
         return f"group.{self.name}.{key}" if self.name else f"node.{key}"
 
     def payload_key(self, kind: TransactionKind) -> str:
-        """Dotted key that a payload is changed by first: what each axis adds, where it adds something."""
+        """Dotted key by which a payload is changed first: the payload of each axis, where there is one."""
         key = self.payload.key_of(kind)
         return f"group.{self.name}.{key}" if self.name else f"payload.{key}"
 
@@ -58,13 +58,13 @@ class ProfileGroup(NamedTuple):
 
 
 SERVO_GRADES: Final = ("published", "measured", "calibrated", "assumed")
-"""The strongest first."""
+"""Grades of [servo], the strongest first."""
 ServoGrade = Literal["published", "measured", "calibrated", "assumed"]
 LengthMm = Annotated[float, Field(ge=0, le=MAX_LENGTH_MM, allow_inf_nan=False)]
 
 
 def _without(never: tuple[int, str]) -> AfterValidator:
-    """Refuse a value of a range."""
+    """Refusal of one value of a range."""
     unwanted, right = never
 
     def check(value: int) -> int:
@@ -76,7 +76,7 @@ def _without(never: tuple[int, str]) -> AfterValidator:
 
 
 def _key(of: type, name: str) -> Any:
-    """The key of a parameter of the servo core: its default, range, description and example."""
+    """Key of a parameter of the servo core: its default, range, description and example."""
     (parameter,) = (parameter for parameter in parameters(of) if parameter.name == name)
     known = parameter.known
     return Field(
@@ -90,7 +90,7 @@ def _key(of: type, name: str) -> Any:
 
 
 def _keys(of: type) -> dict[str, Any]:
-    """All of a dataclass of the servo core, as pydantic makes a model of them."""
+    """Keys of a dataclass of the servo core, in the form from which pydantic makes a model."""
     types = {
         parameter.name: parameter.type
         if parameter.known.never is None
@@ -182,26 +182,20 @@ class ServoSection(AxisKeys):
     )
 
     def axis_keys(self, axis: Literal["x", "y"]) -> dict[str, Any]:
-        """Keys of an axis by name, its own before those of both."""
+        """Keys of an axis by name. Its own override those of both axes."""
         override: AxisOverride = getattr(self, axis)
         return self.model_dump(include=set(AxisKeys.model_fields)) | override.model_dump(exclude_none=True)
 
     def grade_of(self, key: str) -> ServoGrade:
-        """Grade of the value of a key.
-
-        Parameters
-        ----------
-        key
-            Its name in [servo], [servo.x] and [servo.y].
-        """
+        """Grade of the value of a key, by its name in [servo], [servo.x] and [servo.y]."""
         grade: ServoGrade | None = getattr(self.grades, key, None)
         return grade or self.grade
 
     @property
     def grades_given(self) -> tuple[ServoGrade, ...]:
-        """The grade of each value that the profile gives or grades, the weakest first; servo.grade if there is none."""
+        """Grades of the values that the profile gives or grades, the weakest first; servo.grade if there are none."""
         given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set
-        # A default may be graded, unless it means that there is nothing.
+        # A default may be graded, unless it means none.
         given |= {key for key in self.grades.model_fields_set if getattr(self, key)}
         grades = [self.grade_of(key) for key in given & set(ServoGrades.model_fields)] or [self.grade]
         return tuple(sorted(grades, key=SERVO_GRADES.index, reverse=True))
@@ -237,7 +231,7 @@ class CircleSection(Section):
 
 
 CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
-"""Measures of roundness that have a tolerance, in the order of the checks."""
+"""Measures of roundness with a tolerance, in the order of the checks."""
 
 
 class ToleranceSection(Section):
@@ -265,10 +259,10 @@ class ToleranceSection(Section):
 
     @property
     def judged(self) -> tuple[str, ...]:
-        """The measures of roundness that have a tolerance."""
+        """Measures of roundness that the profile gives a tolerance."""
         return tuple(name for name in CONTOUR_MEASURES if getattr(self, name) is not None)
 
     @property
     def judges_contour(self) -> bool:
-        """Whether it says how round the circle must be."""
+        """Whether a tolerance limits the roundness of the circle."""
         return bool(self.judged)

@@ -1,7 +1,7 @@
-"""The profile: what a TOML file may say, with units, ranges and defaults. A kind of bus adds its own keys.
+"""Model of a profile's TOML file, with units, ranges and defaults. A kind of bus adds its own keys.
 
-Models are strict (no text for a number), frozen and closed (an unknown key is refused). A whole number may stand
-for a float.
+Models are strict (no text for a number), frozen and closed (an unknown key is refused). A whole number may stand for a
+float.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -33,7 +33,7 @@ from busplan.sourced import ChangedConstants, changed_constants
 SCHEMA_VERSION: Final = 1
 
 CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance")
-"""The sections that only a circle test reads; a profile that has any of them asks for it."""
+"""Sections that only a circle test reads. A profile with any of them asks for the test."""
 OF_ALIKE_NODES: Final = ("bus.nodes", "payload", "node")
 """Keys on the nodes, where all are alike."""
 
@@ -50,7 +50,7 @@ def _without_control_characters(allowed: str) -> Callable[[str], str]:
 
 
 def _whole(value: object) -> object:
-    # A literal compares: true and 1.0 would pass for 1.
+    # A literal compares by ==, so true and 1.0 would pass for 1.
     if type(value) is not int:
         raise refused(Problem(f"expected {SCHEMA_VERSION}"))
     return value
@@ -89,7 +89,7 @@ class Profile(Section):
 
     @property
     def constants(self) -> ChangedConstants:
-        """Other values of constants, which its figures are computed with: those that held when it was validated."""
+        """Changed constants of the profile's figures: those in force when it was validated."""
         return self._constants
 
     @property
@@ -99,7 +99,7 @@ class Profile(Section):
 
     @property
     def node_groups(self) -> tuple[ProfileGroup, ...]:
-        """The groups of nodes, in the order of the chain: one where all are alike, none where there is no cycle."""
+        """Groups of nodes in the order of the chain: one where all are alike, none without a cycle."""
         if self.group:
             return tuple(ProfileGroup(group.name, group.nodes, group, group) for group in self.group)
         return (ProfileGroup("", self.bus.nodes, self.node, self.payload),) if self.has_cycle else ()
@@ -111,12 +111,9 @@ class Profile(Section):
 
     @classmethod
     def nodes_problems(cls, given: Collection[str]) -> Iterator[Problem]:
-        """Tell what is wrong with the way a profile gives its nodes: all alike, or in groups.
+        """Problems of the way in which a profile gives its nodes: all alike, or in groups.
 
-        Parameters
-        ----------
-        given
-            The sections that it has, and "bus.nodes" if it has that key.
+        Given are its sections, and "bus.nodes" if it has that key.
         """
         for key in OF_ALIKE_NODES:
             if "group" in given and key in given:
@@ -148,7 +145,7 @@ class Profile(Section):
 
 
 def _payloads(nodes: ProfileGroup, place: int) -> Iterator[tuple[str, int, str]]:
-    """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
+    """Key of each payload, its size [bytes], and words on the sum where the key holds only a part of it."""
     section = f"group.{place}" if nodes.name else "payload"
     for kind in TRANSACTION_KINDS:
         key, size = nodes.payload.key_of(kind), int(nodes.bytes_of(kind))

@@ -1,1 +1,1 @@
-"""What public functions share: the base class of answers, arguments and sentences."""
+"""Foundations of all questions: the base class of answers, arguments and sentences."""

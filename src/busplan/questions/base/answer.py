@@ -18,7 +18,7 @@ from busplan.forms.charts import Drawing
 from busplan.forms.terminal import block_lines
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""Function that refuses a file whose library is not installed, by ending."""
+"""Functions that refuse a file whose library is not installed, by ending."""
 
 
 class Answer(ABC):
@@ -35,13 +35,13 @@ class Answer(ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document of the command's `--format json` as new plain data."""
-        # Parse the text, so that both are equal whatever the types of the figures.
+        # The text is parsed, so that both are equal whatever the types of the figures.
         document: dict[str, Any] = json.loads(self.to_json())
         return document
 
     @property
     def html(self) -> str:
-        """The page of the command's `--format html`: one file without network or script."""
+        """The page of `--format html`: one file without network or script."""
         return render(self._named(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -113,10 +113,10 @@ class Answer(ABC):
 
     @abstractmethod
     def report(self) -> Report:
-        """The answer in blocks, from which every form but JSON and CSV is written."""
+        """The answer in blocks, from which all forms but JSON and CSV are written."""
 
     def _named(self) -> Report:
-        """The report, which names the constants that were changed, as the command line names --set."""
+        """The report with the changed constants named, as the command line names --set."""
         profile = getattr(self, "profile", None)
         if profile is None or not profile.constants:
             return self.report()

@@ -20,7 +20,7 @@ from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 
 FilePath = str | os.PathLike[str]
-"""A str may also be the name of a shipped profile; a path object is always a path."""
+"""A path. A str may also be the name of a shipped profile; a path object is always a path."""
 ProfileLike = Profile | FilePath
 Periods = float | Iterable[float]
 """A communication period [us], or several."""
@@ -73,7 +73,7 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
 def with_its_constants(
     question: Callable[_Parameters, _Answer],
 ) -> Callable[_Parameters, _Answer]:
-    """Decorator of a question: it is given the loaded profile, and computes with the constants changed in that."""
+    """Decorator of a question that loads the profile and computes with the constants changed in it."""
     of_loaded: Callable[..., _Answer] = question
 
     @wraps(question)
@@ -87,26 +87,15 @@ def with_its_constants(
 
 
 def load_network(profile: ProfileLike) -> Network:
-    """Read and check a profile as `load_profile` does, and make the network that is computed."""
+    """Network of a profile that is read and checked as by `load_profile`."""
     return network_of(load_profile(profile))
 
 
 def require_cycle(profile: Profile, *, question: str, instead: str = "") -> Profile:
-    """Return a profile that has a cycle; refuse one of messages alone.
+    """The profile, if it has a cycle; one of messages alone raises BusplanError.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    question
-        What needs the cycle, for the message.
-    instead
-        Advice for the message; by default the commands that judge messages.
-
-    Raises
-    ------
-    BusplanError
-        The profile has messages alone.
+    `question` is what needs the cycle, for the message; the advice in it is by default the commands that judge
+    messages.
     """
     if profile.has_cycle:
         return profile
@@ -115,13 +104,7 @@ def require_cycle(profile: Profile, *, question: str, instead: str = "") -> Prof
 
 
 def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:
-    """New values by dotted key, converted from NumPy.
-
-    Raises
-    ------
-    BusplanError
-        The values are no mapping, or a key is no text.
-    """
+    """New values by dotted key, converted from NumPy; other arguments raise BusplanError."""
     if not isinstance(values, Mapping | None):
         raise BusplanError(f'{name} {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
     for key in values or {}:
@@ -131,13 +114,7 @@ def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str
 
 
 def argument(path: FilePath) -> str:
-    """Write a path as the PROFILE argument of the command line.
-
-    Raises
-    ------
-    BusplanError
-        It is standard input, or not a path.
-    """
+    """PROFILE argument of the command line for a path. Standard input, or no path, raises BusplanError."""
     if not isinstance(path, str | os.PathLike):
         raise BusplanError(f"{path!r}: expected a path, the name of a shipped profile, or a Profile")
     if path == "-":
@@ -146,18 +123,12 @@ def argument(path: FilePath) -> str:
 
 
 def from_numpy(value: Any) -> Any:
-    """Convert a NumPy number or array to Python; return anything else unchanged."""
+    """A NumPy number or array as Python data; anything else unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
-    """List of the values, converted from NumPy.
-
-    Raises
-    ------
-    BusplanError
-        There is a single value, or none.
-    """
+    """List of values, converted from NumPy. A single value, or none, raises BusplanError."""
     plain_values = from_numpy(values)
     if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
         raise BusplanError(f"{name} {values!r}: expected several values, as a list")
@@ -168,25 +139,16 @@ def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
 
 
 def one_or_several(values: Any, *, name: str) -> list[Any]:
-    """List of one value or of several, converted from NumPy.
-
-    Raises
-    ------
-    BusplanError
-        There are no values.
-    """
+    """List of one value or of several, converted from NumPy. No value raises BusplanError."""
     plain_values = from_numpy(values)
     is_one = isinstance(plain_values, str | os.PathLike) or not isinstance(plain_values, Iterable)
     return [plain_values] if is_one else items(plain_values, name=name)
 
 
 def checked_models(timing_model: Models | None, network: Network) -> tuple[str, ...]:
-    """Check the name of a timing model, or of several; None means all that can express the network.
+    """Names of one or several timing models, checked; None stands for all that can express the network.
 
-    Raises
-    ------
-    BusplanError
-        An unknown or a repeated name, no name, or a model that cannot express the profile.
+    An unknown or a repeated name, no name, or a model that cannot express the profile raises BusplanError.
     """
     if timing_model is None:
         return model_names(network)
@@ -200,21 +162,9 @@ def checked_models(timing_model: Models | None, network: Network) -> tuple[str, 
 
 
 def checked_model(network: Network, model: str, *, name: str) -> str:
-    """Check the name of a timing model.
+    """Name of a timing model, checked; `name` is that of the parameter.
 
-    Parameters
-    ----------
-    network
-        The network.
-    model
-        The name.
-    name
-        Name of the parameter, for the message.
-
-    Raises
-    ------
-    BusplanError
-        The profile's kind of bus has no such model, or the model cannot express the profile.
+    A model that the kind of bus does not have, or that cannot express the profile, raises BusplanError.
     """
     bus = network.bus
     names = [model.name for model in bus.timing_models]
@@ -229,28 +179,16 @@ def checked_model(network: Network, model: str, *, name: str) -> str:
 
 
 def finite(value: object, *, name: str) -> float:
-    """A finite number.
-
-    Raises
-    ------
-    BusplanError
-        NaN, infinite, a bool, or not a number.
-    """
+    """A finite number. NaN, infinity, a bool or no number raises BusplanError."""
     number = from_numpy(value)
-    # The range is checked first: float() of a huge int would raise OverflowError.
+    # The range is checked first, because float() of a huge int would raise OverflowError.
     if type(number) not in (int, float) or not -MOST_FLOAT <= number <= MOST_FLOAT:
         raise BusplanError(f"{name} {number!r}: expected a finite number")
     return float(number)
 
 
 def whole(value: object, *, name: str) -> int:
-    """A whole number above zero.
-
-    Raises
-    ------
-    BusplanError
-        Anything else, or more than the largest count in a profile.
-    """
+    """A whole number from 1 to the largest count in a profile. Anything else raises BusplanError."""
     number = from_numpy(value)
     if type(number) is not int or not 1 <= number <= MAX_COUNT:
         raise BusplanError(f"{name} {number!r}: expected a whole number from 1 to {MAX_COUNT:,}")
@@ -262,18 +200,10 @@ Origin = tuple[str, KeyChanges]
 
 
 def origin_of(profile: Profile) -> Origin:
-    """The PROFILE argument and the `--set` options that give a profile on the command line.
+    """PROFILE argument and `--set` options that give a profile on the command line.
 
-    Parameters
-    ----------
-    profile
-        Any profile.
-
-    Returns
-    -------
-    tuple
-        The shipped profile of the same name, with the changes that turn it into this one; or NAME.toml without changes,
-        if there is no such shipped profile or no option can make a change.
+    They are the shipped profile of the same name, with the changes that turn it into this one; or NAME.toml without
+    changes, if there is no such shipped profile or no option can make a change.
 
     Examples
     --------
@@ -289,10 +219,7 @@ def origin_of(profile: Profile) -> Origin:
 def key_changes(values: Mapping[str, object]) -> KeyChanges:
     """Changes of a profile from new values by dotted key, as `--set` options.
 
-    Raises
-    ------
-    BusplanError
-        The changes are not new values by key, two keys overlap, or TOML cannot write a value.
+    Values not by key, keys that overlap, or a value that TOML cannot write raise BusplanError.
     """
     changes = []
     for key, value in values_by_key(values, name="changes").items():
@@ -312,5 +239,5 @@ def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
     try:
         changes = key_changes(differing)
         return changes if changes.applied(shipped) == profile else None
-    except (BusplanError, TypeError):  # no option removes a key or a group
+    except (BusplanError, TypeError):  # No option removes a key or a group.
         return None

@@ -39,16 +39,10 @@ NewValues = Mapping[str, BusValue]
 
 
 def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes: bool = True) -> Sentence:
-    """Write each key with its new value and its meaning.
+    """Sentence with each changed key, its new value and its meaning.
 
-    Parameters
-    ----------
-    changes
-        The new values.
-    meanings
-        What a change means on the machine, by key, for keys that do not say so.
-    quotes
-        If True, text values are quoted, as in a profile.
+    `meanings` are those on the machine, for keys that do not say so. `quotes` puts text values in quotes, as in a
+    profile.
     """
 
     def written(key: str, value: object) -> tuple[Part, ...]:
@@ -63,7 +57,7 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
 
 
 def change_meanings(bus: "Bus") -> dict[str, str]:
-    """What a change means on the machine, by key, for keys that do not say so."""
+    """Meanings of changes on the machine, by key, for keys that do not say so."""
     return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
 
 
@@ -73,16 +67,9 @@ def warning_sentences(warnings: Iterable[str]) -> Iterator[Sentence]:
 
 
 def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
-    """Say the grade of the execution time in the figures; nothing if it has no grade, or if they contain none.
+    """Sentence on the grade of the execution time in the figures; none without a grade, or without execution in them.
 
-    If groups differ, each grade is named with its groups.
-
-    Parameters
-    ----------
-    network
-        The network.
-    of_latency
-        Whether the figures are latencies, and not those of the cycle.
+    If groups differ, each grade is named with its groups. `of_latency` tells latencies from figures of the cycle.
     """
     names: dict[str, list[str]] = {}
     for group in network.profile.node_groups:
@@ -109,7 +96,7 @@ def never_measured(tested: Tested) -> str:
 
 
 def reset_sentence(after: FitFigures | None) -> Iterator[Sentence]:
-    """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
+    """Sentence on a cycle that stops fitting at a bus reset; none for another."""
     if after is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in after.safety.after_reset.items())
         text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
@@ -117,7 +104,7 @@ def reset_sentence(after: FitFigures | None) -> Iterator[Sentence]:
 
 
 def margin_words(figures: FitFigures, broken_limits: Iterable[str]) -> tuple[Part, ...]:
-    """The margin of a cycle under one timing model, or by how much it breaks limits; no verdict."""
+    """Margin of a cycle under one timing model, or its excess over limits, without a verdict."""
     available = attribute_value(AVAILABLE, figures)
     if figures.fits:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
@@ -130,7 +117,7 @@ def margin_words(figures: FitFigures, broken_limits: Iterable[str]) -> tuple[Par
 
 
 def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[Part, ...]:
-    """The corrected margin under the model that decides, with its uncertainty if that is known, in its digits."""
+    """Corrected margin under the model that decides, with its uncertainty if known, in the digits that this allows."""
     margin_us, doubt_us = figures.margin_corrected_us, figures.uncertainty_us
     shown = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     decimals = known_decimals(margin_us or 0.0, doubt_us)
@@ -139,7 +126,7 @@ def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[Part, ...]:
 
 
 def time_lines(figures: FitFigures, profile: Profile) -> Iterator[tuple[str, Sentence]]:
-    """How much of its slice a cycle uses and leaves free, under the model that decides: labels and words."""
+    """Labels and words on the used and the free time in the slice, under the model that decides."""
     given_us, uncertainty_us, margin_us = (
         figures.available_us,
         figures.uncertainty_us,
@@ -162,7 +149,7 @@ def used_us(figures: FitFigures) -> float:
 
 
 def safety_record(figures: FitFigures) -> Record:
-    """Whether the settings of the bus are safe, under the key that its kind has for that; empty if it has none."""
+    """Whether the settings of the bus are safe, under the kind's own key; empty if it has none."""
     safety = figures.safety.figure
     return {} if safety is None else {safety.key: figures.safe}
 
@@ -192,7 +179,7 @@ def parts_by(parts: Mapping[str, str]) -> list[Record]:
 
 
 def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDocument:
-    """Add the new values of --set to a document, as `changes`; in `diff`, which has others, as `changes_of_both`."""
+    """A document with the new values of --set as `changes`; in `diff`, which has others, as `changes_of_both`."""
     if not changes.by_set:
         return dict(content)
     name = "changes" if "changes" not in content else "changes_of_both"
@@ -201,7 +188,7 @@ def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDoc
 
 
 def changed_report(report: Report, changes: KeyChanges) -> Report:
-    """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
+    """An answer with the --set options named in a sentence at its top, and in its JSON document."""
     return report._replace(
         blocks=(*changes_sentences(changes), *report.blocks),
         document=changed_document(report.document, changes),
@@ -210,7 +197,7 @@ def changed_report(report: Report, changes: KeyChanges) -> Report:
 
 
 def _changed_records(records: Sequence[Record] | None, changes: KeyChanges) -> Sequence[Record] | None:
-    """Name changed constants in rows for CSV, where no key has them."""
+    """Rows for CSV with the changed constants, where no key has them."""
     if not records or not changes.constants:
         return records
     constants = " ".join(f"{change.key}={change.value}" for change in changes.constants)
@@ -218,7 +205,7 @@ def _changed_records(records: Sequence[Record] | None, changes: KeyChanges) -> S
 
 
 def changes_sentences(changes: KeyChanges) -> list[Sentence]:
-    """Name the --set options in a sentence, because the figures are not those of the file; empty without them."""
+    """Sentence that names the --set options, because the figures are not those of the file; empty without them."""
     options = [Sentence((Code(change.typed),)) for change in changes.by_set]
     return [joined(Sentence(("With ",)), joined(*options, by=" and "), Sentence((".",)), by="")] if options else []
 
@@ -245,24 +232,11 @@ def figure_table(
     is_detail: Callable[[Figure], bool] = lambda _figure: False,
     state: Callable[[Figure, Any], State] = lambda _figure, _figures: "neutral",
 ) -> Table:
-    """Table with a row for each figure.
+    """Table with a row for each figure and a column for each period, model or transaction.
 
-    Parameters
-    ----------
-    rows
-        Figures with their levels.
-    columns
-        One for each period, model or transaction that has the figures.
-    caption
-        Caption of the table.
-    unit
-        If False, the column of units is left out: the caption says the unit.
-    hides_equations
-        If True, the column of equations and sources is shown only with `--all`.
-    is_detail
-        Whether the row of a figure is shown only with `--all`.
-    state
-        State of a figure, from the figure and the figures of its column; "neutral" keeps the state of the value.
+    `rows` are figures with their levels. Without `unit` there is no column of units: the caption has the unit. The
+    column of equations and sources is shown only with `--all` if `hides_equations`, and so is the row of a figure for
+    which `is_detail` is true. `state` gives the state of a figure in its column; "neutral" keeps that of the value.
     """
     equation = TableColumn("eq", kind="words", rank=_DROPPED_FIRST, is_detail=hides_equations)
     head = [TableColumn("figure", kind="words"), equation]

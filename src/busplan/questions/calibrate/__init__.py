@@ -26,29 +26,29 @@ from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
 _FAR: Final = 3.5
-"""Robust standard deviations from which on a measurement is far from the others (Iglewicz and Hoaglin)."""
+"""Distance from which a measurement is far from the others [robust standard deviations] (Iglewicz and Hoaglin)."""
 _OUTLIER_SHARE: Final = 0.01
-"""Least distance of an outlier, as a share of its latency: the steps of a timer are no outliers."""
+"""Least distance of an outlier, as a share of its latency [1]. Steps of a timer are no outliers."""
 _DEVIATION_PER_MAD: Final = 1.4826
 """Standard deviation of a normal distribution whose median absolute deviation is 1."""
 REPETITIONS_TO_COMPARE: Final = 3
-"""Fewest measurements of one payload of which one can be told to be far off."""
+"""Measurements of one payload needed to tell an outlier among them."""
 _DECIMALS: Final = 6
-"""A picosecond: what is smaller is rounding of the subtraction."""
+"""Decimals of a time in us: below a picosecond there is only rounding of the subtraction."""
 _MOST_PROBLEMS: Final = 50
 
 
 class Timed(NamedTuple):
-    """One measurement, and what it says of the node."""
+    """A measurement, with the node's execution time."""
 
     line: int
     transaction: TransactionKind
     payload_bytes: int
     latency_us: float
     packets_us: float
-    """Time of the packets, which is subtracted from the latency."""
+    """Time of the packets, which is subtracted from the latency [us]."""
     execution_us: float
-    """T_exec."""
+    """Execution time T_exec [us]."""
 
 
 class Outlier(NamedTuple):
@@ -60,24 +60,24 @@ class Outlier(NamedTuple):
     latency_us: float
     execution_us: float
     off_us: float
-    """T_exec less the median of its transaction and payload."""
+    """T_exec less the median of its transaction and payload [us]."""
 
 
 class PayloadFit(NamedTuple):
-    """The measurements of one payload, times in us; without its outliers."""
+    """Measurements of one payload without its outliers; times are in us."""
 
     payload_bytes: int
     measurements: int
-    """Number of all, the outliers among them."""
+    """Number of all measurements, outliers included."""
     left_out: int
     """Number of outliers."""
     latency_us: float
-    """T_lant: the median."""
+    """Median of the latency T_lant [us]."""
     packets_us: float
     execution_us: float
-    """T_exec: the median."""
+    """Median of the execution time T_exec [us]."""
     deviation_us: float | None
-    """Standard deviation of T_exec over the repetitions; None for a single measurement."""
+    """Standard deviation of T_exec over the repetitions [us]; None for a single measurement."""
 
 
 def _timed(
@@ -90,10 +90,7 @@ def _timed(
 ) -> list[Timed]:
     """T_exec of each measurement by equation (3): its latency less the time of its packets.
 
-    Raises
-    ------
-    BusplanError
-        Payloads over the limit of the bus, and latencies shorter than their packets, all in one error.
+    Payloads over the limit of the bus, and latencies shorter than their packets, raise one BusplanError for all.
     """
     payloads = network.bus.payloads(network)
     samples, problems = [], []
@@ -119,7 +116,7 @@ def _timed(
 
 
 def _outliers(samples: Sequence[Timed]) -> dict[int, Outlier]:
-    """Measurements far from the median of three or more of the same transaction and payload, by their place.
+    """Measurements by index that are far from the median of three or more of the same transaction and payload.
 
     References
     ----------
@@ -150,7 +147,7 @@ def _middle_distance_us(off_us: Iterable[float]) -> float:
 
 
 def _payload_fits(samples: Sequence[Timed], left_out: Mapping[int, Outlier]) -> tuple[PayloadFit, ...]:
-    """The measurements of each payload, payloads ascending."""
+    """Measurements of each payload, payloads ascending."""
     fits = []
     for size in sorted({sample.payload_bytes for sample in samples}):
         places = [place for place, sample in enumerate(samples) if sample.payload_bytes == size]
@@ -174,7 +171,7 @@ _IN_MEMORY: Final = "measurements"
 _WORST: Final = "worst_extra_us"
 _TIME_DECIMALS: Final = 3
 _PICOSECOND: Final = 1e-3
-"""A picosecond in nanoseconds: what rounding adds is no nanosecond."""
+"""A picosecond [ns]. An excess that rounding adds is no nanosecond."""
 
 
 class Columns(Protocol):
@@ -192,61 +189,44 @@ Measurements = FilePath | bytes | Columns | Iterable[Mapping[str, Any]] | Iterab
 
 @dataclass(frozen=True, slots=True, repr=False)
 class CalibrateAnswer(Answer):
-    """Answer of `calibrate`; times are in us.
-
-    Parameters
-    ----------
-    profile
-        The network that was measured.
-    setup
-        What carries a payload, and the settings of the bus in force, each in a few words.
-    headings
-        Figures that say how the bus is set, by key.
-    source
-        Name of the measurements: the file, or "measurements".
-    nodes
-        The nodes that were measured.
-    timing_model
-        Timing model of the packets.
-    execution
-        The execution time T_exec as the section of a profile: the median at each payload.
-    measurements
-        Number of all measurements, the outliers among them.
-    payloads
-        All measurements of each payload.
-    outliers
-        Measurements far from the others, by line: of rows in memory the number of the row, from 1.
-    unchecked_bytes
-        Payloads with too few measurements to tell an outlier.
-    uncertainty_us
-        Standard uncertainty of T_exec, the spread of the measurements about the medians; None where none is repeated.
-    worst_extra_us
-        Time of the slowest execution beyond the median; None where no outlier is slow.
-    at_most_us
-        A shorter execution cannot be told from a latency.
-    section
-        What the measurements say, as keys of that section.
-    """
+    """Answer of `calibrate`; times are in us."""
 
     profile: Profile
+    """Network that was measured."""
     setup: tuple[str, ...]
+    """Carrier of a payload, and the settings of the bus in force, each in a few words."""
     headings: Mapping[str, object]
+    """Figures on the settings of the bus, by key."""
     source: str
+    """Name of the measurements: the file, or "measurements"."""
     nodes: ProfileGroup
+    """Nodes that were measured."""
     timing_model: str
+    """Timing model of the packets."""
     execution: TableExecution
+    """Execution time T_exec as the section of a profile: the median at each payload."""
     measurements: int
+    """Number of all measurements, outliers included."""
     payloads: tuple[PayloadFit, ...]
+    """All measurements of each payload."""
     outliers: tuple[Outlier, ...]
+    """Measurements far from the others, by line; for rows in memory, by number of the row, from 1."""
     unchecked_bytes: tuple[int, ...]
+    """Payloads with too few measurements to tell an outlier."""
     uncertainty_us: float | None
+    """Standard uncertainty of T_exec [us], the spread of the measurements about the medians; None where none is
+    repeated.
+    """
     worst_extra_us: float | None
+    """Time of the slowest execution beyond the median [us]; None without a slow outlier."""
     at_most_us: float
+    """Smallest execution time that a latency shows [us]."""
     section: dict[str, object]
+    """Keys and values of that section, from the measurements."""
 
     @property
     def key(self) -> str:
-        """Dotted key of the section that the execution time stands in."""
+        """Dotted key of the section with the execution time."""
         return self.nodes.node_key("execution")
 
     @property
@@ -258,14 +238,14 @@ class CalibrateAnswer(Answer):
 
     @property
     def edits(self) -> dict[str, object]:
-        """The changes that `--apply` makes in the file, by key; None removes a key of the old form."""
+        """Changes that `--apply` makes in the file, by key; None removes a key of the old form."""
         gone = dict.fromkeys((*LinearExecution.model_fields, *TableExecution.model_fields))
-        del gone[_WORST]  # what was once seen can happen again
+        del gone[_WORST]  # A slow execution that was once seen can happen again.
         return {f"{self.key}.{key}": value for key, value in {**gone, **self.section}.items()}
 
     @property
     def notes(self) -> dict[str, str]:
-        """The comment that `--apply` writes above the section, by its key: where the execution time is from."""
+        """Comment that `--apply` writes above the section, by its key: the source of the execution time."""
         slow = sum(outlier.off_us > 0 for outlier in self.outliers)
         fast = len(self.outliers) - slow
         doubts = (f"{slow} slow in {_WORST}, " if slow else "", f"{fast} fast left out, " if fast else "")
@@ -284,7 +264,7 @@ class CalibrateAnswer(Answer):
         Parameters
         ----------
         applied_to
-            The profile's file that the execution time was written into; by default none.
+            File of the profile into which the execution time was written; by default none.
         """
         from busplan.questions.calibrate.report import calibration_report
 
@@ -302,8 +282,8 @@ def calibrate(
 ) -> CalibrateAnswer:
     """Find the execution time T_exec of a node from measured latencies.
 
-    T_exec is the latency less the time of its packets, and of each payload the median. Measurements far from the others
-    of their payload are left out: the slow ones are what the slowest execution takes more.
+    T_exec is the latency less the time of its packets; for each payload the median counts. Measurements far from the
+    others of their payload are left out; the slow ones give the extra time of the slowest execution.
 
     Parameters
     ----------
@@ -315,9 +295,9 @@ def calibrate(
         or a data frame; or rows, each a mapping or values in the order of the columns. Columns, n values each:
         payload_bytes, latency_us (T_lant [us]), and where known transaction ("read" or "write").
     group
-        Name of the group of nodes that was measured; by default the one that the profile has.
+        Name of the measured group of nodes; by default the only one of the profile.
     timing_model
-        Name of the timing model that says what the packets take; by default the one that decides.
+        Name of the timing model for the time of the packets; by default the one that decides.
     source
         Name of measurements that are no file, in messages and documents; by default "measurements".
 
@@ -329,7 +309,8 @@ def calibrate(
     Raises
     ------
     BusplanError
-        Not a profile, not measurements (all problems with line and column), no group of that name, or latencies shorter
+        Not a profile, not measurements (all problems with line and column), no group of that name, or latencies
+        shorter
         than their packets.
 
     References
@@ -347,7 +328,7 @@ def calibrate(
     'measured'
     """
     network = load_network(profile)
-    latencies = _latencies_of(network)  # refuses a kind without, before a recording of it is read as text
+    latencies = _latencies_of(network)  # This refuses a kind without them, before a recording of it is read as text.
     read, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
     nodes = _nodes(network.profile, group)
     model = network.bus.deciding_model if timing_model is None else checked_models(timing_model, network)[0]
@@ -413,7 +394,7 @@ def _section(
 
 
 def _nodes(profile: Profile, group: str | None) -> ProfileGroup:
-    """The nodes that were measured."""
+    """Nodes that were measured."""
     by_name = {nodes.name: nodes for nodes in profile.node_groups}
     if group is None and len(by_name) == 1:
         return profile.node_groups[0]
@@ -426,7 +407,7 @@ def _nodes(profile: Profile, group: str | None) -> ProfileGroup:
 
 
 def _latencies_of(network: Network) -> MeasuredLatencies:
-    """How the kind of bus finds execution times from latencies."""
+    """Method by which the kind of bus finds execution times from latencies."""
     bus = network.bus
     if bus.calibration is None:
         way_out = f"; {bus.recordings} is for busplan measured" if bus.recordings else ""

@@ -37,7 +37,7 @@ _COLUMNS: Final = {
 _DECIMALS: Final = 3
 _MOST_LINES: Final = 10
 _LONG_EXECUTION_US: Final = 10_000.0
-"""Longer than the execution time of any motion node: the latencies are probably in ns."""
+"""Time longer than any motion node's execution [us]; latencies that show it are probably in ns."""
 
 
 def time_value(value_us: float, key: str) -> ShownValue:
@@ -46,15 +46,7 @@ def time_value(value_us: float, key: str) -> ShownValue:
 
 
 def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Report:
-    """Report of `calibrate`.
-
-    Parameters
-    ----------
-    answer
-        The calibration.
-    applied_to
-        The profile that the execution time was written into; None if it was not written.
-    """
+    """Report of `calibrate`; `applied_to` is the profile into which the execution time was written, or None."""
     name = answer.profile.name
     payloads = [fit._asdict() for fit in answer.payloads]
     warned = [*_warnings(answer)]
@@ -102,14 +94,14 @@ def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
 
 
 def _cell(value: float | None, key: str) -> Cell:
-    """A time has three decimals; further ones are rounding."""
+    """A cell with a count, or with a time to three decimals, since further ones are rounding."""
     if value is None:
         return ""
     return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else count_value(value, key)
 
 
 def fit_sentence(answer: CalibrateAnswer) -> Sentence:
-    """What the execution time is the median of."""
+    """Sentence on the measurements whose median is the execution time."""
     number, sizes = answer.measurements, len(answer.payloads)
     without = ", without the outliers" if answer.outliers else ""
     return sentence(
@@ -123,7 +115,7 @@ def fit_sentence(answer: CalibrateAnswer) -> Sentence:
 
 
 def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
-    """What to check before using these figures."""
+    """Sentences on what to check before these figures are used."""
     for word, outliers in (
         ("slow", [outlier for outlier in answer.outliers if outlier.off_us > 0]),
         ("fast", [outlier for outlier in answer.outliers if outlier.off_us <= 0]),
@@ -154,7 +146,7 @@ def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
 
 
 def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> Sentence:
-    """The slow executions, or the measurements that the others contradict, by their lines."""
+    """Sentence on the slow executions, or on the measurements that others contradict, by their lines."""
     count, more = len(outliers), len(outliers) - _MOST_LINES
     lines = joined(*(_outlier(outlier) for outlier in outliers[:_MOST_LINES]), by=", ")
     parts = [

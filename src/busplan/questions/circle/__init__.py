@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from busplan.servo.circle import CircleRun
 
 NEGLIGIBLE_MM: Final = 1e-4
-"""Contour error below which no error source of the profile matters; chosen, far below that of any machine [mm]."""
+"""Contour error below which no error source of the profile matters [mm]; chosen far below that of any machine."""
 CIRCLE_FIGURES: Final = read_figures("busplan.questions.circle")["circle"]
 CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
 """Figures of the circle test by key."""
@@ -37,20 +37,20 @@ JITTER: Final = CIRCLE_BY_KEY["jitter_us"]
 def telling_measures(profile: Profile) -> tuple[str, ...]:
     """Keys of the measures that tell how round a circle is.
 
-    Those with a tolerance; without one, G of a whole turn, or the largest contour error of a trapezoid.
+    They are those with a tolerance; without one, G of a whole turn, or the largest contour error of a trapezoid.
     """
     whole = "max_contour_error_mm" if profile.circle.path == "trapezoid" else "circular_deviation_mm"
     return profile.tolerance.judged or (whole,)
 
 
 class Contribution(NamedTuple):
-    """One error source, and the circle without it."""
+    """An error source, with figures of the circle without it."""
 
     source: str
     max_contour_error_mm: float
     """Largest contour error without this source [mm]."""
     removed_mm: float
-    """How much larger the largest contour error is with it [mm]; negative if it hides another source."""
+    """Increase of the largest contour error by this source [mm]; negative if it hides another source."""
     mean_contour_error_mm: float
     """Mean contour error without this source [mm]."""
     circular_deviation_mm: float | None
@@ -63,69 +63,72 @@ class Contribution(NamedTuple):
 
 
 class CircleFigures(NamedTuple):
-    """Circle test at one period. Figures of a simulation that did not run are None."""
+    """Figures of the circle test at one period. Those of a simulation that did not run are None."""
 
     period_us: float
     feed_mm_per_min: float
     radius_mm: float
     path: str
-    """trapezoid or iso230-4."""
+    """Path of the circle: trapezoid or iso230-4."""
     duration_s: float
     setpoints: int
     steps: int
     step_us: float
     loop: str
     update: str
-    """When a node applies a command of a loop on the host."""
+    """Time at which a node applies a command of a loop on the host."""
     delay_us: float
-    """Bus delay inside the loop, the longer of both axes; 0 for a loop on the node."""
+    """Bus delay inside the loop [us], the longer of both axes; 0 for a loop on the node."""
     delay_x_us: float
     delay_y_us: float
     jitter_us: float
-    """Jitter of the synchronous packet, +/- about its mean: the profile's own and what the bus adds."""
+    """Jitter of the synchronous packet [us], +/- about its mean: the profile's own and that of the bus."""
     timing_model: str
-    """Timing model that decided whether the bus fits."""
+    """Timing model that decides whether the bus fits."""
     bus_fits: bool
     """Whether no limit is broken, time among them: required <= available."""
     verdict: str
-    """fits, not shown to fit, or does not fit: a circle passes only on a bus that is shown to carry it."""
+    """The verdict: fits, not shown to fit, or does not fit. A circle passes only on a bus that is shown to carry it."""
     required_us: float
     available_us: float
     servo_grade: str
-    """The weakest grade of the profile's servo values: published, measured, calibrated or assumed."""
+    """Weakest grade of the profile's servo values: published, measured, calibrated or assumed."""
     ideal_drive: bool
     """Whether the profile has no [servo], so that an ideal drive was simulated."""
     stable: bool | None
     phase_margin_deg: float | None
-    """The smaller of both axes; None also if no loop gain reaches one."""
+    """Smaller phase margin of both axes [deg]; None also if no loop gain reaches one."""
     gain_margin_db: float | None
-    """The smaller of both axes; None also if no gain makes a loop unstable."""
+    """Smaller gain margin of both axes [dB]; None also if no gain makes a loop unstable."""
     crossover_hz: float | None
-    """Crossover of the axis with the smaller phase margin."""
+    """Crossover of the axis with the smaller phase margin [Hz]."""
     settled: bool | None
-    """Whether the loops settle before the measured turn, None on a trapezoid. If they do not, every measure is None."""
+    """Whether the loops settle before the measured turn; None on a trapezoid. If they do not, every measure is None."""
     mean_contour_error_mm: float | None
     max_contour_error_mm: float | None
     radial_deviation_min_mm: float | None
     radial_deviation_max_mm: float | None
     circular_deviation_mm: float | None
-    """G about the least-squares centre of a whole turn; None on a trapezoid."""
+    """Circular deviation G about the least-squares centre of a whole turn [mm]; None on a trapezoid."""
     radius_deviation_mm: float | None
     centre_offset_mm: tuple[float, float] | None
     constant_speed_deg: float | None
-    """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
+    """Arc at constant speed for F, G, radius and centre [deg]; 360 on a turn."""
     sources_matter: bool | None
-    """Whether one of the `telling_measures` is 0.1 um or more. If not, no error source of the profile matters, and the
-    test says nothing about a machine. None if nothing was measured."""
+    """Whether one of the `telling_measures` is 0.1 um or more; None if nothing was measured. If not, no error source of
+    the profile matters, and the test says nothing about a machine.
+    """
     passed: bool | None
-    """None, not judged, if nothing fails, and the profile has no contour tolerance or no error source matters."""
+    """Whether the circle passes; None, not judged, if nothing fails and there is no contour tolerance or no error
+    source matters.
+    """
     failures: "tuple[Failure, ...]"
     contributions: tuple[Contribution, ...] | None
-    """Largest first; None if they were not asked for and no contour measure failed."""
+    """Contributions, the largest first; None if they were not requested and no contour measure failed."""
 
     @property
     def verdict_word(self) -> str:
-        """The verdict in a word or two."""
+        """Verdict in a word or two."""
         if self.stable is None:
             return "NOT RUN"
         if self.passed is not None:
@@ -134,15 +137,15 @@ class CircleFigures(NamedTuple):
 
     @property
     def failed_measure(self) -> str | None:
-        """Key of the first contour measure that misses its tolerance; None if there is none."""
+        """Key of the first contour measure that misses its tolerance; None without one."""
         failed = (failure for failure in self.failures if failure.name in CONTOUR_MEASURES)
         return next((failure.name for failure in failed if failure.value is not None), None)
 
     @property
     def to_attack(self) -> tuple[Contribution, float] | None:
-        """The source to remove first: without it the failed measure is smallest; and by how much [mm].
+        """Source to remove first, without which the failed measure is smallest, and the gain [mm].
 
-        None if no contour measure fails, contributions were not asked for, or no removal reduces the measure.
+        None if no contour measure fails, contributions were not requested, or no removal reduces the measure.
         """
         measure = self.failed_measure
         if measure is None or not self.contributions:
@@ -158,26 +161,17 @@ class CircleTestAnswer(Answer):
 
     Figures of a simulation that did not run are None, as is the run of a cycle that does not fit the bus. Answers are
     compared by identity, because traces are arrays.
-
-    Parameters
-    ----------
-    profile
-        The profile.
-    results
-        Figures of each period.
-    runs
-        Simulation of each period.
-    with_contributions
-        If True, document and report rank the error sources.
-    shapes
-        Contour error of each simulation, by angle and over time, condensed for drawings; empty where none is drawn.
     """
 
     profile: Profile
     results: tuple[CircleFigures, ...]
+    """Figures of each period."""
     runs: "tuple[CircleRun | None, ...]"
+    """Simulation of each period."""
     with_contributions: bool = False
+    """Whether document and report rank the error sources."""
     shapes: "tuple[Shape | None, ...]" = ()
+    """Contour error of each simulation, by angle and over time, condensed for drawings; empty where none is drawn."""
 
     @property
     def passed(self) -> bool | None:
@@ -197,7 +191,7 @@ class CircleTestAnswer(Answer):
         Parameters
         ----------
         every
-            n, to write every n-th step [1].
+            n, to write every n-th step.
 
         Returns
         -------
@@ -215,7 +209,7 @@ class CircleTestAnswer(Answer):
         return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
 
     def drawing(self) -> Drawing:
-        """The magnified circle, its error over time and the ranked error sources.
+        """Drawing of the magnified circle, its error over time and the ranked error sources.
 
         Raises
         ------
@@ -248,7 +242,7 @@ def circle_test(
     contributions
         If True, remove each error source in turn, and rank them.
     progress
-        Called from time to time with the steps simulated and the steps known to be needed.
+        Function called from time to time with the steps simulated and the steps known to be needed.
 
     Returns
     -------

@@ -31,29 +31,29 @@ from busplan.servo.circle import CircleRun
 from busplan.servo.path import Direction
 
 _ERROR_SHARE: Final = 0.25
-"""Largest drawn error as a share of the drawn radius."""
+"""Largest drawn error as a share of the drawn radius [1]."""
 _WIDEST: Final = 3.0
-"""A tolerance is drawn only up to this multiple of the largest error: a larger ring would flatten the error."""
+"""Largest tolerance that is drawn, as a multiple of the largest error. A larger ring would flatten the error."""
 _FLAT: Final = 0.1
-"""Smallest spread of the errors, as a share of the largest, that is drawn with zero: less would look like one line."""
+"""Smallest spread of the errors, as a share of the largest, drawn with zero; less would look like one line."""
 _NANOMETRES_BELOW_UM: Final = 0.1
 TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
 
 
 class LengthUnit(NamedTuple):
-    """Unit of written lengths."""
+    """A unit of written lengths."""
 
     name: str
     per_um: float
     """Number of units in 1 um."""
 
     def text(self, length_um: float) -> str:
-        """Write a round length with its unit."""
+        """A round length with its unit."""
         return f"{length_um * self.per_um:g} {self.name}"
 
 
 def length_unit(largest_um: float) -> LengthUnit:
-    """Choose a unit in which a small length is not a row of zeros.
+    """Unit in which a small length is not a row of zeros.
 
     Examples
     --------
@@ -67,14 +67,14 @@ class Magnified(NamedTuple):
     """Scale of a circle with its error magnified."""
 
     largest_mm: float
-    """Error at the edge: the largest error, or the tolerance if that is larger."""
+    """Error at the edge: the largest error, or the tolerance if that is larger [mm]."""
     ring_um: float
-    """Distance between rings."""
+    """Distance between rings [um]."""
     tolerance_mm: float | None
-    """Tolerance to draw as a ring; None if there is none or it lies far outside."""
+    """Tolerance to draw as a ring [mm]; None without one, or for one far outside."""
 
     def magnification(self, radius_mm: float) -> float:
-        """How much larger the error is drawn than the circle."""
+        """Magnification of the error against the circle [1]."""
         return _ERROR_SHARE / self.largest_mm * radius_mm
 
     def radius(self, error_mm: float) -> float:
@@ -83,7 +83,7 @@ class Magnified(NamedTuple):
 
     @property
     def unit(self) -> LengthUnit:
-        """Unit of its errors."""
+        """Unit of the errors."""
         return length_unit(self.largest_mm * 1e3)
 
     @property
@@ -93,20 +93,13 @@ class Magnified(NamedTuple):
 
     @property
     def rings_mm(self) -> tuple[float, ...]:
-        """Errors at the rings, from the innermost to the outermost; the nominal circle is 0."""
+        """Errors at the rings, from the innermost to the outermost [mm]; the nominal circle is 0."""
         most = floor(self.largest_mm * 1e3 / self.ring_um + 1e-9)
         return tuple(ring * self.ring_um / 1e3 for ring in range(-most, most + 1))
 
 
 def magnified(largest_mm: float, *, tolerance_mm: float | None) -> Magnified | None:
-    """Find the scale of a circle; None if there is no error to show.
-
-    Parameters
-    ----------
-    largest_mm
-        Largest contour error, without its sign [mm].
-    tolerance_mm
-        Largest contour error that is allowed, where there is a limit [mm].
+    """Scale of a circle, from its largest contour error without sign and its tolerance [mm]; None without an error.
 
     Examples
     --------
@@ -128,24 +121,19 @@ class ErrorRange(NamedTuple):
 
     @property
     def largest_um(self) -> float:
-        """End further from zero, without its sign."""
+        """Larger end of the range, without its sign [um]."""
         return max(abs(self.bottom_um), abs(self.top_um))
 
     @property
     def zero_outside(self) -> str:
-        """Note that zero is not on the scale; empty if it is."""
+        """Note that zero is outside of the scale; empty if it is inside."""
         if self.bottom_um > 0:
             return "0 lies below"
         return "0 lies above" if self.top_um < 0 else ""
 
 
 def error_range(low_um: float, high_um: float) -> ErrorRange:
-    """Range of the errors with zero in it; without zero if the errors would look like one line.
-
-    Parameters
-    ----------
-    low_um, high_um
-        Smallest and largest error, signed [um].
+    """Range of errors from the smallest to the largest [um], with zero unless the errors would look like one line.
 
     Examples
     --------
@@ -161,17 +149,7 @@ def error_range(low_um: float, high_um: float) -> ErrorRange:
 
 
 def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dial:
-    """Draw the nominal circle, the rings, the tolerance and the path with its error magnified.
-
-    Parameters
-    ----------
-    contour
-        Contour error around the circle.
-    scale
-        How much it is magnified.
-    direction
-        Direction of rotation; the circle starts on the positive x axis.
-    """
+    """Nominal circle, rings, tolerance, and the path with its error magnified, from the positive x axis on."""
     low, high = (
         tuple(None if error is None else scale.radius(error) for error in errors)
         for errors in (contour.low_mm, contour.high_mm)
@@ -193,10 +171,10 @@ class _Row(NamedTuple):
 
 
 class _Scales(NamedTuple):
-    """Scales and limits that all rows share, so that they can be compared."""
+    """Scales and limits of all rows, so that they can be compared."""
 
     circle: Magnified | None
-    """None if there is no error to show."""
+    """Scale of the circles; None without an error to show."""
     errors: ErrorRange
     unit: LengthUnit
     tolerance: ToleranceSection
@@ -226,19 +204,13 @@ def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
 
 
 _ROOM: Final = 0.08
-"""Empty room above and below the errors, as a share of their range."""
+"""Empty room above and below the errors, as a share of their range [1]."""
 _TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: "neutral"}
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
 def circle_drawing(test: CircleTestAnswer) -> Drawing:
-    """Draw each simulated period on the same scales, one below the other.
-
-    Parameters
-    ----------
-    test
-        The circle test, with at least one simulated period.
-    """
+    """Drawing of each simulated period, at least one, on the same scales, one below the other."""
     simulated = zip(test.results, test.runs, test.shapes, strict=True)
     rows = [_Row(result, run, shape) for result, run, shape in simulated if run is not None and shape is not None]
     scales = _common_scales(rows, test.profile.tolerance)
@@ -255,7 +227,7 @@ def circle_drawing(test: CircleTestAnswer) -> Drawing:
 
 
 def _circle(row: _Row, scales: _Scales) -> Panel:
-    """The setup, the verdict, and the circle on the scale of all periods."""
+    """Setup, verdict, and the circle on the scale of all periods."""
     result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
     deviation = _measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
@@ -268,7 +240,7 @@ def _circle(row: _Row, scales: _Scales) -> Panel:
 
 
 def _shown(row: _Row, scales: _Scales) -> str:
-    """What the circle shows, or why it is not drawn."""
+    """Words on the circle's scale, or on the reason why it is not drawn."""
     if row.run.diverged:
         return f"circle not drawn: the {'table left the circle' if row.result.stable else 'loop is unstable'}"
     if scales.circle is None:
@@ -278,14 +250,14 @@ def _shown(row: _Row, scales: _Scales) -> str:
 
 
 def _measure_text(value_mm: float | None, limit_mm: float | None, scales: _Scales) -> str:
-    """A measure with its unit, and its tolerance where there is one."""
+    """A measure with its unit, and with its tolerance if it has one."""
     unit = scales.unit
     value = "-" if value_mm is None else f"{decimals_of(value_mm * 1e3 * unit.per_um, 3)} {unit.name}"
     return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
 
 
 def _errors(row: _Row, scales: _Scales) -> Panel:
-    """The contour error over time, with its mean and maximum above: the measured part strong and shaded."""
+    """Contour error over time, with mean and maximum above; the measured part is strong and shaded."""
     errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
     result, limit_mm = row.result, tolerance.max_contour_error_mm
     mean = _measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
@@ -302,7 +274,7 @@ def _errors(row: _Row, scales: _Scales) -> Panel:
 
 
 def _curve(part: ErrorPart, up: Ruler, row: _Row, *, per_um: float) -> Curve:
-    """The error curve of a part of the move; errors far off the scale are clipped: nothing draws huge numbers."""
+    """Error curve of a part of the move. Errors far off the scale are clipped: nothing draws huge numbers."""
     spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
     errors = np.clip(part.error_um * per_um, up.low - spread, up.high + spread)
     if part.measured:
@@ -316,7 +288,7 @@ def _curve(part: ErrorPart, up: Ruler, row: _Row, *, per_um: float) -> Curve:
 
 
 def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
-    """What each error source adds to the largest error, the largest first.
+    """Shares of the error sources in the largest error, the largest first.
 
     Periods whose table followed the circle share one scale, all others a second.
     """

@@ -15,7 +15,7 @@ from busplan.servo.circle import FULL_TURN_DEG, CircleRun
 from busplan.servo.runnable import LONGEST_SETTLING_US
 
 MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
-"""Smallest allowed margins of the loop by key, with their unit. They have defaults, so they are always judged."""
+"""Units of the smallest allowed margins of the loop, by key. They have defaults, so they are always judged."""
 STABILITY: Final = ("stability", *MARGINS)
 """Failures of the loop itself."""
 _WITHOUT_TURN: Final = "circular_deviation_without_turn"
@@ -31,11 +31,11 @@ class Stated(NamedTuple):
     value: float
     """Value in the unit of its key."""
     key: str
-    """The figure of the circle test, or the tolerance."""
+    """Key of the figure of the circle test, or of the tolerance."""
     unit: str
-    """Unit to write it in."""
+    """Unit in which the value is written."""
     decimals: int | None
-    """None for all decimals."""
+    """Decimals; None for all."""
 
     def __str__(self) -> str:
         number = self.value * 1e3 if self.unit == "um" else self.value
@@ -43,7 +43,7 @@ class Stated(NamedTuple):
 
 
 class _Message(NamedTuple):
-    """Message template of a failure; {beyond} is the distance between {value} and {limit}."""
+    """Template of a failure's message; {beyond} is the distance between {value} and {limit}."""
 
     words: str
     unit: str = "um"
@@ -96,10 +96,10 @@ _TIME_FAILURES: Final = ("required_us", "safe_required_us")
 
 
 class Failure(NamedTuple):
-    """One failure of the test: a tolerance or a limit of the bus that is not held, or instability."""
+    """A failure of the test: a tolerance or a limit of the bus that is not held, or instability."""
 
     name: str
-    """Key of the tolerance or of the limit, or a word for what else fails."""
+    """Key of the tolerance or of the limit, or a word for another failure."""
     value: float | None
     limit: float | None
     limit_words: str = ""
@@ -115,13 +115,13 @@ class Failure(NamedTuple):
         return bool(self.limit_words) or self.name in _TIME_FAILURES
 
     def document(self) -> dict[str, Any]:
-        """The failure as in the JSON document; a value that does not exist is null, and the text says why."""
+        """The failure as in the JSON document. A value that does not exist is null, and the text says why."""
         numbers = {"value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
         return {"name": self.name, **numbers, "text": self.text}
 
     @property
     def text(self) -> str:
-        """Message: what does not hold, and by how much."""
+        """Message on what does not hold, and by how much."""
         return "".join(map(str, self.parts()))
 
     def parts(self) -> Iterator[str | Stated]:
@@ -197,8 +197,8 @@ def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple
     )
     return (
         *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
-        # A table that stands still on the circle has no radial error, so the turn itself is judged, too; but only once
-        # the loops have settled.
+        # A table that stands still on the circle has no radial error, so the turn itself is judged, too, once the loops
+        # have settled.
         *(() if run.follows or not settled else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
         *low,
         *contour,

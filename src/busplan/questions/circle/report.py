@@ -43,7 +43,7 @@ from busplan.sections.profile import Profile
 
 
 def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """The tolerances and limits that the circle holds or breaks, and the error source to attack first."""
+    """Sentences on tolerances and limits that the circle holds or breaks, and on the error source to attack first."""
     period, feed = _setup_values(result)
     subject = (Code(profile.name), " at ", period, " and ", feed)
     is_open = result.passed is None and result.stable is not None
@@ -76,7 +76,7 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
 
 
 def _are_zero(profile: Profile) -> str:
-    """Name the usual error sources of a machine that a profile has not; empty if it has all."""
+    """Usual error sources of a machine that a profile does not have, in words; empty if it has all."""
     servo, mechanics, delivery = profile.servo, profile.mechanics, profile.delivery
     axes = (servo, servo.x, servo.y)
     usual = {
@@ -91,7 +91,7 @@ def _are_zero(profile: Profile) -> str:
 
 
 def _unjudged(profile: Profile, result: CircleFigures) -> tuple[Part, ...]:
-    """The measure that needs a tolerance, and its key."""
+    """Measure that needs a tolerance, and its key."""
     key = telling_measures(profile)[0]
     measure = CIRCLE_BY_KEY[key]
     value = attribute_value(measure, result)
@@ -99,7 +99,7 @@ def _unjudged(profile: Profile, result: CircleFigures) -> tuple[Part, ...]:
 
 
 def _attack(result: CircleFigures) -> Iterator[Sentence]:
-    """Say which error source to attack first for the first contour measure that fails."""
+    """Sentence on the error source to attack first for the first contour measure that fails."""
     measure, attack = result.failed_measure, result.to_attack
     if measure is None:
         return
@@ -116,7 +116,7 @@ def _attack(result: CircleFigures) -> Iterator[Sentence]:
 
 
 def _setup_values(result: CircleFigures) -> tuple[ShownValue, ShownValue]:
-    """The period and the feed of a test."""
+    """Period and feed of a test."""
     return period_value(result.period_us), attribute_value(CIRCLE_BY_KEY["feed_mm_per_min"], result)
 
 
@@ -130,7 +130,7 @@ def _failure_words(result: CircleFigures) -> Sentence:
 
 
 def _servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """The grade of the servo values behind the figures; nothing without a simulation."""
+    """Sentence on the grade of the servo values behind the figures; none without a simulation."""
     if result.stable is None:
         return
     if result.ideal_drive:
@@ -149,7 +149,7 @@ _SHOWN: Final = (
 )
 """Figures of the table, in order."""
 _HOST_ROWS: Final = ("update", "delay_us")
-"""Rows of the table that only loops on the host have."""
+"""Rows of the table for loops on the host alone."""
 ACT_TOGETHER: Final = Sentence(
     ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
 )
@@ -188,7 +188,7 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
 
 
 def _falling(test: CircleTestAnswer) -> Iterator[Sentence]:
-    """Say why the largest error falls with a longer period, where it does."""
+    """Sentence on why the largest error falls with a longer period, if it does."""
     circles = [result for result in test.results if result.max_contour_error_mm is not None]
     circles.sort(key=lambda result: result.period_us)
     for before, after in pairwise(circles):
@@ -216,7 +216,7 @@ def _circle_table(results: Sequence[CircleFigures]) -> Table:
 
 
 def _contributions_table(result: CircleFigures) -> Table:
-    """The error sources, ranked, each with a bar on a common scale."""
+    """Error sources, ranked, each with a bar on a common scale."""
     ranked = result.contributions or ()
     removed = [source.removed_mm for source in ranked]
     least, most = min((0.0, *removed)), max((0.0, *removed))
@@ -320,15 +320,7 @@ _BLOCK: Final = 4096
 
 
 def trace_records(test: CircleTestAnswer, *, every: int) -> Iterator[Record]:
-    """One row for every n-th step of each simulated period.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    every
-        n, 1 or more [1].
-    """
+    """Rows of every n-th step of each simulated period."""
     for result, run in zip(test.results, test.runs, strict=True):
         if run is None:
             continue

@@ -1,4 +1,4 @@
-"""The circle test: is the circle still round at this period?
+"""Circle test: is the circle still round at this period?
 
 The bus is checked first: a cycle that does not fit its period delivers no set-points to simulate. Then stability: the
 delay of a host loop can make the circle rounder while it reduces the margins, so a circle without margins fails.
@@ -50,18 +50,18 @@ class Setup(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Simulated steps of each axis [1]."""
+        """Simulated steps of each axis."""
         return self.path.setpoints * self.timing.steps_per_period
 
     def with_axes(self, **changes: Any) -> "Setup":
-        """Return a copy with parameters replaced on both axes."""
+        """Copy with parameters replaced on both axes."""
         return self._replace(x=replace(self.x, **changes), y=replace(self.y, **changes))
 
 
 def _with_setpoints_every_step(setup: Setup) -> Setup:
-    """Return the setup with a set-point at every step; unchanged if the period has effects beyond the path's chords."""
+    """The setup with a set-point at every step; unchanged if the period has effects beyond the path's chords."""
     path, timing, delivery = setup.path, setup.timing, setup.delivery
-    # A host's loop, jitter, skew and losses act once per period: a shorter period would change these, too.
+    # A host's loop, jitter, skew and losses act once per period, and a shorter period would change these, too.
     irregular = delivery.jitter_us or delivery.skew_us or delivery.loss_probability
     if timing.loop == "host" or irregular or timing.steps_per_period == 1 or setup.steps >= MAX_SETPOINTS:
         return setup
@@ -97,20 +97,20 @@ _REMOVALS: Mapping[str, Callable[[Setup], Setup]] = {
     "scale": lambda setup: setup._replace(mechanics=replace(setup.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
     "squareness": lambda setup: setup._replace(mechanics=replace(setup.mechanics, squareness_um_per_m=0.0)),
 }
-"""Function that removes each error source. A velocity feed-forward of 1 has no error of its own."""
+"""Functions that each remove an error source. A velocity feed-forward of 1 has no error of its own."""
 
 
 def sources(setup: Setup) -> dict[str, Setup]:
     """Error sources of a setup, each with the setup without it."""
     without = {source: remove(setup) for source, remove in _REMOVALS.items()}
     if setup.timing.loop == "host":
-        # A host's loop holds its command between periods: interpolation does not apply.
+        # A host's loop holds its command between periods, so interpolation does not apply.
         del without["hold"]
     return {source: left for source, left in without.items() if left != setup}
 
 
 def setup_of(network: Network) -> Setup:
-    """Input of the circle simulation of a network; its circle must be one that can be run."""
+    """Setup of the circle simulation of a network, whose circle must be one that can be run."""
     profile, settling_us = network.profile, path_settling_us(network)
     circle = profile.circle
     x, y = loop_axes(network)
@@ -134,35 +134,28 @@ def setup_of(network: Network) -> Setup:
 
 _AXES: Final = 2
 _STEP_US: Final = {True: 0.08, False: 0.5}
-"""Time for a step of one axis with its measures, by whether the kernel is compiled; measured on a machine of 2024."""
+"""Time for a step of one axis with its measures [us], by whether the kernel is compiled; measured on a machine of 2024.
+"""
 _SETPOINT_US: Final = 1.5
 _STEP_BYTES: Final = 18
-"""Positions of both axes, and what is computed from them at a time."""
+"""Memory for a step: positions of both axes, and what is computed from them at a time [bytes]."""
 _SETPOINT_BYTES: Final = 200
 _LONG_S: Final = 10.0
 
 
 class Estimate(NamedTuple):
-    """Approximate cost of some simulations."""
+    """Approximate cost of simulations."""
 
     steps: int
-    """Simulated steps, an axis at a time."""
+    """Simulated steps, those of each axis counted."""
     time_s: float
     memory_bytes: float
 
 
 def estimate(kept: Sequence[Setup], only_measured: Iterable[Setup] = ()) -> Estimate:
-    """Estimate what simulations cost.
-
-    Parameters
-    ----------
-    kept
-        Simulations whose positions are kept, one for each period.
-    only_measured
-        Simulations whose positions are dropped after their measures are taken.
-    """
+    """Approximate cost of simulations: of those whose positions are kept, and of those that are only measured."""
     rate_us = _STEP_US[compiled_kernel("auto") is not None]
-    # Only their sizes are held: each setup takes memory, and an iterator makes them one by one.
+    # Only their sizes are held, because each setup takes memory; an iterator makes them one by one.
     sizes = [(setup.steps, setup.path.setpoints) for setup in chain(kept, only_measured)]
     memory_bytes = [_STEP_BYTES * steps + _SETPOINT_BYTES * setpoints for steps, setpoints in sizes]
     return Estimate(
@@ -173,7 +166,7 @@ def estimate(kept: Sequence[Setup], only_measured: Iterable[Setup] = ()) -> Esti
 
 
 def announce(cost: Estimate) -> None:
-    """Log what a long run costs; without a handler, `logging` writes it to standard error."""
+    """Log the cost of a long run. Without a handler, `logging` writes it to standard error."""
     if cost.time_s > _LONG_S:
         engine = "" if compiled_kernel("auto") else ", in plain Python"
         words = f"about {cost.time_s:.0f} s and {cost.memory_bytes / 1e9:.2g} GB{engine}"
@@ -181,7 +174,7 @@ def announce(cost: Estimate) -> None:
 
 
 _LEAST_ARC_DEG: Final = 270.0
-"""Shortest arc of a trapezoid for a least-squares centre and radius."""
+"""Shortest arc of a trapezoid for a least-squares centre and radius [deg]."""
 _CONTOUR_FIGURES: Final = (*CONTOUR_MEASURES, "radial_deviation_min_mm", "radial_deviation_max_mm")
 
 
@@ -193,25 +186,12 @@ def run_circles(
     explain: bool = True,
     progress: Progress | None = None,
 ) -> CircleTestAnswer:
-    """Run the circle test of a network.
+    """Run the circle test of a network, whose profile has the servo and the circle.
 
-    Parameters
-    ----------
-    network
-        The network; its profile has the servo and the circle.
-    periods_us
-        Communication periods T_s [us]; by default the profile's own.
-    with_contributions
-        If True, rank the error sources, which takes one more simulation for each.
-    explain
-        If True, the error sources are also ranked where a contour tolerance fails.
-    progress
-        Called from time to time with the steps simulated and the steps known to be needed.
-
-    Raises
-    ------
-    BusplanError
-        A circle cannot be run; for example, the drive cannot reach the feed.
+    Periods T_s are in us; None stands for the profile's own. `with_contributions` ranks the error sources, which takes
+    a simulation for each; `explain` ranks them where a contour tolerance fails. Progress is called with the steps
+    simulated and the steps known to be needed. A circle that cannot be run, for example at a feed that the drive cannot
+    reach, raises BusplanError.
 
     References
     ----------
@@ -219,8 +199,8 @@ def run_circles(
     """
     variants = at_periods(network, periods_us)
     counter = _Counter(progress)
-    # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus
-    # needs no path.
+    # Every period is set up before the first simulation, so that errors come at once. A period that does not fit the
+    # bus needs no path.
     for variant in variants:
         require_circle(variant)
     fits = [figures(variant, model=variant.bus.deciding_model) for variant in variants]
@@ -240,7 +220,7 @@ def run_circles(
 
 
 class _Counter:
-    """Adds up the steps of several simulations and reports them as one progress."""
+    """Sum of the steps of several simulations, reported as one progress."""
 
     def __init__(self, progress: Progress | None) -> None:
         self._progress = progress
@@ -295,7 +275,7 @@ def _test(
 
 
 def _ranked(run: CircleRun, without: Mapping[str, Setup], *, counter: _Counter) -> tuple[Contribution, ...]:
-    """The contribution of each error source of a circle, the largest first.
+    """Contributions of a circle's error sources, the largest first.
 
     Sources interact: their contributions need not add up to the whole error.
     """

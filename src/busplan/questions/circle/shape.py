@@ -14,7 +14,7 @@ CONTOUR_SECTORS: Final = 720
 
 
 class ContourProfile(NamedTuple):
-    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in a sector without points."""
+    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in one without points."""
 
     low_mm: tuple[float | None, ...]
     high_mm: tuple[float | None, ...]
@@ -26,25 +26,14 @@ class ContourProfile(NamedTuple):
 
 
 def contour_profile(run: CircleRun) -> ContourProfile:
-    """Condense the measured part of a circle test.
-
-    Parameters
-    ----------
-    run
-        The simulation.
-
-    Returns
-    -------
-    ContourProfile
-        Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
-    """
+    """Contour error of the measured part of a circle test, by sectors counter-clockwise from the positive x axis."""
     low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
     for block in blocks(run.measured):
         x_mm, y_mm = run.x_mm[block], run.y_mm[block]
         error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
         turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
         sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
-        # Neighbouring points are mostly in the same sector: each run of them is reduced to its extremes first.
+        # Neighbouring points are mostly in the same sector, so each run of them is reduced to its extremes first.
         entered = np.flatnonzero(np.diff(sector, prepend=-1))
         np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
         np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
@@ -56,13 +45,13 @@ def contour_profile(run: CircleRun) -> ContourProfile:
 
 Floats = NDArray[np.float64]
 _MAX_POINTS: Final = 1000
-"""Points of the whole move's curve, smallest and largest of each pixel or so: more would not be visible."""
+"""Points of the whole move's curve, smallest and largest of each pixel or so. More would not be visible."""
 _LEAST_POINTS: Final = 50
-"""Points of a part of the move, however short it is."""
+"""Points of a part of the move, however short."""
 
 
 class ErrorPart(NamedTuple):
-    """A part of the move: points of its error curve, reduced to their extremes if they are many."""
+    """A part of the move with the points of its error curve, reduced to their extremes if they are many."""
 
     time_s: Floats
     error_um: Floats
@@ -73,18 +62,18 @@ class Shape(NamedTuple):
     """Contour error of a simulated circle, condensed."""
 
     contour: ContourProfile | None
-    """By angle, of the measured part; None where the table left the circle."""
+    """Contour error by angle in the measured part; None where the table left the circle."""
     parts: tuple[ErrorPart, ...]
-    """Over time: before, in and after the measured part; neighbours share a point."""
+    """Contour error over time before, in and after the measured part; neighbours share a point."""
 
     @classmethod
     def of(cls, run: CircleRun) -> "Shape":
-        """The shape of a simulation."""
+        """Shape of a simulation."""
         return cls(None if run.diverged else contour_profile(run), _parts(run))
 
 
 def _parts(run: CircleRun) -> tuple[ErrorPart, ...]:
-    """The parts before, in and after the measured turn or arc; neighbours share a point."""
+    """Parts before, in and after the measured turn or arc; neighbours share a point."""
     error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
     start, stop = run.measured.start, min(run.measured.stop, run.steps)
     ranges = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))
@@ -98,19 +87,9 @@ def _parts(run: CircleRun) -> tuple[ErrorPart, ...]:
 
 
 def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
-    """Choose points that keep the outline of a curve: of each stretch the smallest and the largest.
+    """Indices of points that keep the outline of a curve: smallest and largest of each stretch, first and last.
 
-    Parameters
-    ----------
-    values
-        The curve, shape (n,).
-    most
-        About how many points are chosen; a shorter curve keeps all [1].
-
-    Returns
-    -------
-    ndarray
-        Indices in ascending order, the first and the last one among them.
+    They are about `most` points, ascending; a shorter curve keeps all.
 
     Examples
     --------

@@ -26,7 +26,7 @@ from busplan.sourced import constants_changed
 Judgement = Literal["better", "worse", "same", "neutral"]
 
 ROUNDING: Final = 1e-9
-"""Relative difference that float rounding can cause; figures that differ by less are the same."""
+"""Relative difference that float rounding can cause; figures that differ by less are the same [1]."""
 _Figures: TypeAlias = Mapping[str, Any]
 """Figures by key."""
 
@@ -42,7 +42,7 @@ class KeyDifference:
 
 @dataclass(frozen=True)
 class ComparedFigure:
-    """One figure of both profiles. A value that does not exist is None."""
+    """A figure of both profiles. A value that does not exist is None."""
 
     part: str
     """"plan" under the timing models that decide, or the name of a timing model."""
@@ -50,11 +50,11 @@ class ComparedFigure:
     a: Any
     b: Any
     judgement: Judgement
-    """B compared with A."""
+    """Judgement on B against A."""
     difference: float | None
     """B minus A; None unless both are numbers."""
     relative_difference: float | None
-    """`difference` as a share of the absolute value of A; None if that is meaningless."""
+    """`difference` as a share of the absolute value of A [1]; None if that is meaningless."""
 
     def is_regression(self, *, tolerance: float) -> bool:
         """Whether B is worse by more than a share of A; without numbers, whether it is worse at all."""
@@ -69,7 +69,7 @@ class DiffSide:
     """One of the two profiles."""
 
     argument: str
-    """As it was given; the name of a `Profile`."""
+    """Argument as given; the name of a `Profile`."""
     profile: Profile
     deciding: CapacityFigures
     """Figures of the timing model that decides."""
@@ -78,28 +78,21 @@ class DiffSide:
 
     @property
     def verdict(self) -> VerdictWord | None:
-        """The verdict of the timing model that decides."""
+        """Verdict of the timing model that decides."""
         return self.deciding.verdict
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class DiffAnswer(Answer):
-    """Answer of `diff`.
-
-    Parameters
-    ----------
-    a, b
-        The profiles with their verdicts; B is judged against A.
-    keys
-        The keys whose values differ, defaults applied.
-    figures
-        Every figure of both, with B - A and its `judgement`: "better", "worse", "same" or "neutral".
-    """
+    """Answer of `diff`."""
 
     a: DiffSide
     b: DiffSide
+    """The profiles with their verdicts; B is judged against A."""
     keys: tuple[KeyDifference, ...]
+    """Keys whose values differ, defaults applied."""
     figures: tuple[ComparedFigure, ...]
+    """Figures of both, with B - A and its `judgement`: "better", "worse", "same" or "neutral"."""
 
     @property
     def same(self) -> bool:
@@ -107,7 +100,7 @@ class DiffAnswer(Answer):
         return not self.keys
 
     def judged(self, judgement: Judgement) -> tuple[ComparedFigure, ...]:
-        """The figures with one judgement, in order."""
+        """Figures with one judgement, in order."""
         return tuple(figure for figure in self.figures if figure.judgement == judgement)
 
     def regressions(self, *, tolerance_percent: float = 0.0) -> tuple[ComparedFigure, ...]:
@@ -116,7 +109,7 @@ class DiffAnswer(Answer):
         Parameters
         ----------
         tolerance_percent
-            How much worse a number may be than A's [%].
+            Margin by which a number may be worse than A's [%].
 
         Raises
         ------
@@ -129,7 +122,7 @@ class DiffAnswer(Answer):
         return tuple(figure for figure in self.figures if figure.is_regression(tolerance=allowed / 100))
 
     def regression_words(self, *, tolerance_percent: float = 0.0) -> str:
-        """Name the `regressions` in a sentence; empty if there are none."""
+        """Sentence that names the `regressions`; empty without any."""
         from busplan.questions.diff.report import regression_words
 
         return regression_words(self, tolerance_percent=tolerance_percent)
@@ -214,7 +207,7 @@ def _models(timing_model: Models, a: Network, b: Network) -> tuple[str, ...]:
             f"timing_model {timing_model}: the kinds of bus, {a.bus.kind} and {b.bus.kind}, have no timing "
             "model in common; leave it out"
         )
-    checked_models(timing_model, b)  # refuses a model that cannot express this one
+    checked_models(timing_model, b)  # This refuses a model that cannot express B.
     return checked_models(timing_model, a)
 
 
@@ -238,10 +231,10 @@ def _constants(profile: Profile) -> dict[str, KeyValue]:
 
 
 def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
-    """Figures of the plan: the verdict of the model that decides, and what all models share.
+    """Figures of the plan: the verdict of the model that decides, and figures that all models share.
 
-    A longer period or one more node is a choice, neither good nor bad by itself. Nor are the bias and the uncertainty:
-    the corrected margin and the smallest safe period have them.
+    A longer period or one more node is a choice, neither good nor bad by itself. Bias and uncertainty are not judged
+    either, because the corrected margin and the smallest safe period contain them.
     """
     setup = by_key(figure for bus in buses for figure in bus.figures.setup)
     return (
@@ -291,13 +284,13 @@ def _of_model(network: Network, model: str) -> CapacityFigures:
 
 
 def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
-    """A figure of each group."""
+    """A figure for each group."""
     for name in names:
         yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
 
 
 def _by_key(figures: CapacityFigures) -> _Figures:
-    """Figures of one profile by key, with the figures of its groups."""
+    """Figures of one profile by key, those of its groups included."""
     keys = (register.SAFE_NODES.key, register.MAX_NODES.key)
     groups = {f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in keys}
     return {**figures.values(), **groups}
@@ -334,14 +327,14 @@ def _judgement(measure: Figure, a: Any, b: Any, *, noise: float) -> Judgement:
 
 
 def _rank(measure: Figure, value: Any) -> float | None:
-    """A figure as a number that ranks it; None if it has no rank. True ranks above False."""
+    """A figure as a number that ranks it, True above False; None without a rank."""
     if measure.key == register.VERDICT.key and value is not None:
         return -float(VERDICTS.index(value))
     return float(value) if isinstance(value, int | float) else None
 
 
 def _share(change: float | None, before: Any, *, noise: float) -> float | None:
-    """A change as a share of the absolute value before; None if that value is only rounding."""
+    """A change as a share of the absolute value before [1]; None if that value is only rounding."""
     if change is None or abs(before) <= noise:
         return None
     share = change / abs(before)

@@ -48,15 +48,15 @@ _STATES: Final[dict[Judgement, State]] = {
     "same": "neutral",
     "neutral": "neutral",
 }
-"""State of a judgement on B."""
+"""State of each judgement on B."""
 _MOST_NAMED: Final = 4
-"""Most figures that the sentence names."""
+"""Figures that the sentence names, at most."""
 _MOST_KEYS: Final = 12
-"""Most keys shown to a reader without --all; JSON lists all."""
+"""Keys shown to a reader without --all, at most; JSON lists all."""
 _ALL_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
 _MOST_CHARACTERS: Final = 60
-"""Longest value shown in full."""
+"""Length up to which a value is shown in full [characters]."""
 _CONTEXT: Final = 8
 """Characters shown before the first one that differs."""
 
@@ -100,14 +100,14 @@ def diff_report(answer: DiffAnswer) -> Report:
 
 
 def regression_words(answer: DiffAnswer, *, tolerance_percent: float) -> str:
-    """Message that names the figures of B that are worse; empty if there are none."""
+    """Message that names the figures of B that are worse; empty without any."""
     names = _names(answer.regressions(tolerance_percent=tolerance_percent))
     by = f" by more than {tolerance_percent:.12g} %" if tolerance_percent else ""
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}" if names else ""
 
 
 def _sentence(answer: DiffAnswer) -> Sentence:
-    """The verdicts of both, and in what B is worse and better."""
+    """Sentence with the verdicts of both, and with the figures in which B is worse and better."""
     sides = ((" (A) ", answer.a), (" (B) ", answer.b))
     parts = [part for label, side in sides for part in (Code(side.argument), f"{label}{_verdict(side)}", ", ")][:-1]
     judged = [words for judgement in ("worse", "better") if (words := _judged(answer, judgement))]
@@ -156,7 +156,7 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
             for number, key in enumerate(answer.keys)
         )
         yield Table(_KEYS, tuple(rows))
-    # What only one of two kinds of bus has is no difference.
+    # Figures that only one of two kinds of bus has are no difference.
     differ = [
         figure
         for figure in answer.figures
@@ -171,7 +171,7 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
 
 
 def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> Cell:
-    """One side of a difference; the other side decides which part or how many digits of a long value are shown."""
+    """One side of a difference. The other side decides which part or how many digits of a long value are shown."""
     if value is None:
         return MISSING
     here, there = value.value, None if opposite is None else opposite.value
@@ -188,7 +188,7 @@ def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> Cell:
 
 
 def excerpt(text: str, opposite: str = "") -> str:
-    """Cut a long text to the part where it begins to differ from the other.
+    """Part of a long text where it begins to differ from the other.
 
     Examples
     --------

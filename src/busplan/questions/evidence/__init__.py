@@ -32,24 +32,24 @@ Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
 
 
 class Comparison(NamedTuple):
-    """One published figure and one way to compute it."""
+    """A published figure and one computation of it."""
 
     section: str
     quantity: str
     unit: Unit
     published: float | None
-    """As printed, or the quotient of two printed figures; None where the source gives a formula and no figure."""
+    """Figure as printed, or quotient of two printed figures; None if the source gives a formula and no figure."""
     method: str
-    """The equation or timing model behind the computed figure."""
+    """Equation or timing model of the computed figure."""
     computed: float
     grade: Grade | None
-    """How well the published figure is known; None where there is none."""
+    """Grade of the published figure; None without one."""
     uncertainty: float | None = None
-    """Expanded uncertainty of the computed figure, in `unit`; None where it is not weighed."""
+    """Expanded uncertainty of the computed figure, in `unit`; None if it is not computed."""
 
     @property
     def residual(self) -> float | None:
-        """Computed less published, in `unit`."""
+        """Computed less published figure, in `unit`."""
         return None if self.published is None else self.computed - self.published
 
     @property
@@ -59,13 +59,13 @@ class Comparison(NamedTuple):
 
 
 class EvidenceSection(NamedTuple):
-    """One table or passage of a source."""
+    """A table or passage of a source."""
 
     title: str
     note: str
     comparisons: tuple[Comparison, ...]
     data: str
-    """Data file that the published figures stand in, with their sources."""
+    """Data file with the published figures and their sources."""
 
 
 class Row(Section):
@@ -74,28 +74,29 @@ class Row(Section):
     quantity: str
     unit: Unit
     published: int | float | None = Field(default=None, gt=0)
-    """The figure as printed; None for a computed one alone."""
+    """The figure as printed; None for a row with a computed one alone."""
     grade: Grade | None = None
-    """How well the published figure is known."""
+    """Grade of the published figure."""
     share_of: int | float = Field(default=1, gt=0)
-    """A printed figure that both are shown as a share of."""
+    """Printed figure of which both are shown as a share."""
     profile: str
-    """Shipped profile that is computed."""
+    """Shipped profile of the computation."""
     set: dict[str, Any] = Field(default={})
     """New values of the profile, by dotted key."""
     model: str | None = None
     """Timing model; None for the one that decides."""
     method: str | None = None
-    """Name of the way to compute it; None for the timing model."""
+    """Name of the computation; None for the timing model."""
     figures: tuple[str | int | float, ...] = Field(strict=False, min_length=1)
-    """What is computed, added up: figures of capacity (required_us), of a transaction (latency.write.latency_us) or of
-    the circle test (circle.duration_s), constants and functions of the kind of bus, and numbers of the source."""
+    """Terms of the computed figure: figures of capacity (required_us), of a transaction (latency.write.latency_us) or
+    of the circle test (circle.duration_s), constants and functions of the kind of bus, and numbers of the source.
+    """
     given: dict[str, Any] = Field(default={})
     """Arguments of the function."""
     divided_by: dict[str, Any] | None = None
     """Divisor of the computed figure: the same row with these keys changed."""
     doubt: str | None = None
-    """Key of the doubts that U of the computed figure comes from."""
+    """Key of the doubts from which U of the computed figure comes."""
 
     @model_validator(mode="after")
     def _is_graded(self) -> Self:
@@ -105,7 +106,7 @@ class Row(Section):
 
 
 class _Table(Section):
-    """A table [[evidence]]; its further keys hold for each of its rows."""
+    """A table [[evidence]]; its further keys apply to each of its rows."""
 
     model_config = ConfigDict(extra="allow")
     title: str
@@ -119,20 +120,9 @@ class _Table(Section):
 def sections_of(bus: Bus, data: str, *, progress: Progress | None = None) -> Iterator[EvidenceSection]:
     """Compare the published figures of a data file with computed ones, table by table.
 
-    Parameters
-    ----------
-    bus
-        The kind of bus; a table whose first profile is of another kind is left out.
-    data
-        Name of the data file.
-    progress
-        Called from time to time with the steps of circle tests simulated and the steps known to be needed.
-
-    Raises
-    ------
-    BusplanError
-        An unknown or missing key, or a profile, timing model or figure that does not exist; the message names file,
-        table and row.
+    A table whose first profile is of another kind of bus is left out. Progress is called with the steps of circle tests
+    simulated and the steps known to be needed. An unknown or missing key, profile, timing model or figure raises
+    BusplanError, which names file, table and row.
     """
     cases: dict[str, _Case] = {}
 
@@ -153,7 +143,7 @@ def sections_of(bus: Bus, data: str, *, progress: Progress | None = None) -> Ite
 
 
 def _rows(table: _Table) -> Iterator[Row]:
-    """Each row by each of its methods."""
+    """Each row with each of its methods."""
     for content in table.rows:
         shared = {key: value for key, value in content.items() if key != "methods"}
         for method in content.get("methods", table.methods):
@@ -183,7 +173,7 @@ def _placed(place: str) -> Iterator[None]:
 
 
 class _Case:
-    """A profile under a timing model, asked for figures by the names that rows have for them."""
+    """A profile under a timing model, with figures by their names in rows."""
 
     def __init__(self, row: Row, progress: Progress | None) -> None:
         self.profile = override(load(row.profile).profile, row.set)
@@ -207,7 +197,7 @@ class _Case:
         return run_circles(self.network, progress=self._progress).results[0]
 
     def sum_of(self, row: Row) -> float:
-        """The figures of a row with this profile and this model, added up."""
+        """Sum of a row's figures for this profile and this model."""
         return sum(self._figure(name, row.given) if isinstance(name, str) else name for name in row.figures)
 
     def _figure(self, name: str, given: Mapping[str, Any]) -> float:
@@ -255,7 +245,7 @@ def _comparison(title: str, row: Row, case: Callable[[Row], _Case]) -> Compariso
 
 
 def _divided(number: float, divisor: float) -> float:
-    """The quotient; a whole number that nothing divides stays one."""
+    """A quotient; a whole number divided by 1 stays whole."""
     return number if divisor == 1 else number / divisor
 
 
@@ -264,7 +254,7 @@ _PAPER = ("ieee1394", "paper")
 
 
 class KindEvidence(NamedTuple):
-    """Published figures about one kind of bus; no section where there are none."""
+    """Published figures on one kind of bus; no section if there are none."""
 
     kind: str
     title: str
@@ -276,19 +266,13 @@ class KindEvidence(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class EvidenceAnswer(Answer):
-    """Answer of `evidence`.
-
-    Parameters
-    ----------
-    kinds
-        Each kind of bus with its `sections`, whose `comparisons` have a published figure, its grade, and the computed
-        one.
-    paper
-        Whether these are the figures of the paper alone.
-    """
+    """Answer of `evidence`."""
 
     kinds: tuple[KindEvidence, ...]
+    """Kinds of bus, each with `sections`, whose `comparisons` have a published figure, its grade, and the computed one.
+    """
     paper: bool = False
+    """Whether the figures are those of the paper alone."""
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -309,9 +293,9 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     kind
         Kind of bus, as "ieee1394"; by default all of them.
     paper
-        If True, only what the paper publishes, on its own kind of bus, as `busplan paper` shows it.
+        If True, show only the paper's own figures, on its kind of bus, as `busplan paper` does.
     progress
-        Called from time to time with the steps simulated and the steps known to be needed.
+        Function called from time to time with the steps simulated and the steps known to be needed.
 
     Returns
     -------
@@ -321,7 +305,7 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     Raises
     ------
     BusplanError
-        No such kind; or a kind beside `paper`.
+        No such kind; or a kind together with `paper`.
 
     Examples
     --------

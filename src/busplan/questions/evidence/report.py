@@ -1,4 +1,4 @@
-"""Report of `evidence`, and of `paper`, which is the part of the paper."""
+"""Report of `evidence`, and of `paper`, its part on the paper."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -23,21 +23,13 @@ from busplan.questions.evidence import Comparison, KindEvidence
 _DIGITS: Final = 5
 """Significant digits of a published figure or a quotient of two."""
 _DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0, "bits": 0}
-"""Decimals by unit; contour errors in mm are micrometres, so that they need six."""
+"""Decimals by unit. Contour errors in mm are micrometres, so they need six."""
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
 
 
 def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Report:
-    """Report of `evidence`, kind by kind; the report of `paper` is the tables of its one kind.
-
-    Parameters
-    ----------
-    kinds
-        The figures of each kind.
-    paper
-        Whether it is the report of `paper`.
-    """
+    """Report of `evidence`, kind by kind; the report of `paper` has only the tables of its one kind."""
     records = _records(kinds, paper=paper)
     title = "Published figures beside" if paper else "What others have published or measured, beside"
     return Report(
@@ -49,7 +41,7 @@ def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Re
 
 
 def _records(kinds: Sequence[KindEvidence], *, paper: bool) -> list[Record]:
-    """One row for each figure and method; rows of `evidence` begin with kind and data file."""
+    """Rows of each figure and method; those of `evidence` begin with kind and data file."""
     return [
         {
             **({} if paper else {"kind": kind.kind, "data": section.data}),
@@ -92,7 +84,7 @@ def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
 
 
 def _summary(kind: KindEvidence) -> Table:
-    """How far the computed figures of each section are from the published ones, by method."""
+    """Table of the deviations of each section's computed figures from the published ones, by method."""
     rows = []
     for section in kind.sections:
         by_method: dict[str, list[Comparison]] = {}

@@ -37,31 +37,21 @@ from busplan.sourced import Input
 
 @dataclass(frozen=True, repr=False)
 class ExplainAnswer(Answer):
-    """Answer of `explain`.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    derivations
-        The figure under each period, transaction and timing model, with its `value`, `steps` and `inputs`; empty
-        without a figure.
-    assumptions
-        Without a figure, what the verdict rests on, the least well known first; empty with one.
-    figures
-        Without a figure, each figure that can be explained, with its command; empty with one.
-    equations
-        Without a figure, one row for each equation: numbers, formula, function and source; empty with one.
-    constants
-        Without a figure, one row for each constant of the kind of bus: value, unit, grade and source; empty with one.
-    """
+    """Answer of `explain`."""
 
     profile: Profile
     derivations: tuple[Derivation, ...] = ()
+    """The figure for each period, transaction and timing model, with `value`, `steps` and `inputs`; empty without a
+    figure.
+    """
     assumptions: tuple[Input, ...] = ()
+    """Without a figure, the inputs on which the verdict rests, the least well known first; empty with one."""
     figures: tuple[tuple[CommandName, Figure], ...] = ()
+    """Without a figure, each figure that can be explained, with its command; empty with one."""
     equations: tuple[Record, ...] = ()
+    """Without a figure, one row for each equation: numbers, formula, function and source; empty with one."""
     constants: tuple[Record, ...] = ()
+    """Without a figure, one row for each constant of the kind of bus: value, unit, grade and source; empty with one."""
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -93,10 +83,10 @@ def explain(
     profile
         The network: a `Profile`, a path or a shipped name.
     figure
-        A key of the JSON of capacity or latency that an equation leads to: "required_us"; "latency.gaps_us" where both
-        have it and the first is not meant. So do the number of an equation, "(11)"; a label of a table, "arbitration";
-        and the name of a transaction, a message or a group of nodes, for its latency. Without it, what the verdict
-        rests on, and all these figures.
+        A key in the JSON of capacity or latency that an equation leads to: "required_us"; "latency.gaps_us" if both
+        have it and the first is not meant. Or the number of an equation, "(11)"; a label of a table, "arbitration";
+        the name of a transaction, a message or a group of nodes, for its latency. Without it, the answer has the
+        inputs on which the verdict rests, and all these figures.
     period_us
         Communication period T_s [us], or several; by default the profile's own.
     timing_model
@@ -156,7 +146,7 @@ def explain(
 
 
 def figure_names() -> list[str]:
-    """Keys of figures that `explain` takes, on all kinds of bus; of one kind not all exist."""
+    """Keys of figures that `explain` takes, on all kinds of bus. No single kind has all of them."""
     registers = (figures for kind in kind_names() for figures in figures_of(kind_named(kind)).values())
     figures = (figure for register in registers for figure in register.values())
     return list(

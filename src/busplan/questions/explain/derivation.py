@@ -32,24 +32,24 @@ GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "pu
 """Grades from the weakest to the strongest; "given" values are choices, not knowledge."""
 _MOST_HINTS: Final = 3
 _BESIDE: Final = MappingProxyType({MARGIN_CORRECTED.key: (UNCERTAINTY,)})
-"""Figures that are derived beside another: a margin says nothing without its uncertainty."""
+"""Figures that are derived together with another: a margin says nothing without its uncertainty."""
 
 
 class Step(NamedTuple):
-    """One line of a derivation."""
+    """A line of a derivation."""
 
     key: str
-    """Key of the figure in the results; a name used only here if it is no figure."""
+    """Key of the figure in the results; for another number, a name used only here."""
     symbol: str
     """Symbol in formulas."""
     reference: str
-    """Numbers of its equations, or another source."""
+    """Numbers of the equations, or another source."""
     formula: str
-    """The computation in symbols."""
+    """Computation in symbols."""
     numbers: str
-    """The computation in numbers."""
+    """Computation in numbers."""
     value: object
-    """The result: a number or a truth value; None if it does not exist."""
+    """Result: a number or a truth value; None if it does not exist."""
     unit: str
     """Unit of the result; empty for counts and shares."""
 
@@ -64,16 +64,16 @@ class Derivation:
     transaction: str | None
     """Transaction of a figure of `latency`; None for others."""
     period_us: float | None
-    """Communication period; None for a network without a cycle."""
+    """Communication period [us]; None for a network without a cycle."""
     value: object
     """Value as in the command's JSON; None if it does not exist."""
     steps: tuple[Step, ...]
-    """In the order of computation; the last step is the figure, unless that is an input."""
+    """Steps in the order of computation. The last one is the figure, unless that is an input."""
     inputs: tuple[Input, ...]
 
     @property
     def reference(self) -> str:
-        """Numbers of its equations, or another source."""
+        """Numbers of the figure's equations, or another source."""
         return self.steps[-1].reference if self.steps else self.figure.reference
 
     @property
@@ -83,34 +83,21 @@ class Derivation:
 
 
 class Wanted(NamedTuple):
-    """What a name stands for."""
+    """Figures and transactions for which a name stands."""
 
     command: CommandName
     figures: tuple[Figure, ...]
     transactions: tuple[str, ...] | None = None
-    """Transactions that the name stands for; None for all."""
+    """Transactions for which the name stands; None for all."""
 
 
 def derive(
     networks: Sequence[Network], name: str, *, timing_models: Sequence[str] | None, transactions: Sequence[str] | None
 ) -> tuple[Derivation, ...]:
-    """Derive a figure at each of some periods.
+    """Derive a figure, by a name for `wanted`, at the period of each network.
 
-    Parameters
-    ----------
-    networks
-        The network at each period.
-    name
-        Name of the figure; see `wanted`.
-    timing_models
-        Timing models; by default the one that decides, or the first that has the figure.
-    transactions
-        Transactions, for a figure of `latency`; by default all that have it.
-
-    Raises
-    ------
-    BusplanError
-        There is no such figure, no equation leads to it, or an option does not apply to it.
+    Without timing models it is the one that decides, or the first that has the figure; without transactions, all that
+    have it. BusplanError: there is no such figure, no equation leads to it, or an option does not apply to it.
     """
     network = networks[0]
     meant = wanted(name, network)
@@ -127,7 +114,7 @@ def derive(
 
 
 def _at_period(network: Network, meant: Wanted, timing_models: Sequence[str] | None) -> Iterator[Derivation]:
-    """The derivations of some figures, nested by transaction, figure and timing model."""
+    """Derivations of some figures, nested by transaction, figure and timing model."""
     models = timing_models or model_names(network)
     numbers = {model: numbers_of(network, meant.command, model=model) for model in models}
     for transaction, figure in product(meant.transactions or numbers[models[0]], meant.figures):
@@ -160,7 +147,7 @@ _INFINITE: Final = re.compile(r"\binf\b")
 
 
 def _existing(value: object) -> object:
-    """A value; None for infinity, which stands for what does not exist."""
+    """A value; None for infinity, which stands for a figure that does not exist."""
     return None if isinstance(value, float) and isinf(value) else value
 
 
@@ -177,29 +164,17 @@ def _why_none(network: Network, meant: Wanted, timing_models: Sequence[str] | No
 
 
 def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
-    """Figures by command and key. Without a command, a key means that of the first command that has it."""
+    """Figures by command and key. Without a command, a key belongs to the first command that has it."""
     return {"capacity": by_key(bus.figures.capacity), "latency": by_key(bus.figures.latency)}
 
 
 def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[str, _Numbers]:
-    """All figures of a command that equations lead to, in traced numbers: by transaction and key.
+    """Figures of a command that equations lead to, in traced numbers, by transaction and key.
 
-    Parameters
-    ----------
-    network
-        The network, of plain numbers.
-    command
-        The command; figures of `capacity` have the transaction "".
-    model
-        Timing model.
-
-    Returns
-    -------
-    dict
-        Numbers; an infinite one does not exist.
+    Figures of `capacity` have the transaction "". An infinite number stands for a figure that does not exist.
     """
     figures = figures_of(network.bus)[command]
-    # Traced for each command: a number keeps the name that it is given first.
+    # Traced for each command, because a number keeps its first name.
     network = traced_network(network)
     with constants_looked_up(TracedConstant):
         return _numbers_of(network, command, model, figures)
@@ -232,7 +207,7 @@ def _of_capacity(cycle: BusCycle, *, is_decided: bool) -> dict[str, Number | Non
 
 
 def _traced(numbers: Mapping[str, Number | None], figures: Mapping[str, Figure]) -> dict[str, Traced]:
-    """Numbers of the figures by key, each with its symbol; None is left out."""
+    """Numbers of the figures by key, each with its symbol, without None."""
     return {
         key: _named(number, key, figures[key].symbol)
         for key, number in numbers.items()
@@ -250,7 +225,7 @@ def _named(number: Number, key: str, symbol: str) -> Traced:
 
 
 def explained_figures(network: Network) -> list[tuple[CommandName, Figure]]:
-    """Every figure of a network that an equation leads to, with its command, in the order of their documents."""
+    """Figures of a network that an equation leads to, each with its command, in the order of their documents."""
     explained: list[tuple[CommandName, Figure]] = []
     for command, figures in figures_of(network.bus).items():
         traced = [keys for model in model_names(network) for keys in numbers_of(network, command, model=model).values()]
@@ -264,20 +239,11 @@ def latency_names(network: Network) -> tuple[str, ...]:
 
 
 def wanted(name: str, network: Network) -> Wanted:
-    """Find what a name stands for.
+    """Figures and transactions for which a name stands.
 
-    Parameters
-    ----------
-    name
-        A key ("required_us"), also behind its command ("latency.gaps_us"); the number of an equation ("(11)"); the
-        label or the symbol of a figure in tables ("arbitration"); or the name of a transaction, a message or a group.
-    network
-        The network.
-
-    Raises
-    ------
-    BusplanError
-        There is none; the message suggests similar names.
+    The name is a key ("required_us"), also after its command ("latency.gaps_us"); the number of an equation ("(11)");
+    the label or the symbol of a figure in tables ("arbitration"); or the name of a transaction, a message or a group.
+    An unknown one raises BusplanError, which suggests similar names.
 
     Examples
     --------
@@ -312,7 +278,7 @@ def wanted(name: str, network: Network) -> Wanted:
 
 
 def _names(figure: Figure) -> set[str]:
-    """Other names of a figure: in tables, and beside the other terms."""
+    """Other names of a figure: in tables, and among the other terms."""
     return {_letters(figure.label), _letters(term_name(figure.key))}
 
 
@@ -331,18 +297,10 @@ def _hint(name: str, network: Network) -> str:
 
 
 def assumptions(network: Network) -> tuple[Input, ...]:
-    """Inputs that the verdict rests on, each with its grade, the least well known first.
+    """Inputs on which the verdict rests, each with its grade, the least well known first.
 
-    Parameters
-    ----------
-    network
-        The network.
-
-    Returns
-    -------
-    tuple
-        Inputs of the cycle under every timing model, of its uncertainty and of the limits, without "given" ones. An
-        execution time without a grade comes first: it is a fact, not a choice.
+    They are those of the cycle under every timing model, of its uncertainty and of the limits, without "given" ones. An
+    execution time without a grade comes first: it is a fact, not a choice.
     """
     profile, bus = network.profile, network.bus
     limited = traced_network(network)
@@ -360,7 +318,7 @@ def assumptions(network: Network) -> tuple[Input, ...]:
     executions = tuple(group.node_key("execution.") for group in profile.node_groups)
 
     def rank(given: Input) -> int:
-        """Place of the grade of an input; a choice comes after all of them."""
+        """Rank of an input by its grade; a choice comes after all grades."""
         if given.grade != "given":
             return GRADES.index(given.grade)
         is_time = given.name.startswith(executions) and not given.name.endswith(choosing_keys(bus))

@@ -9,17 +9,17 @@ from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, constants
 
 _ATOM: Final = 4
 _MOST_TERMS: Final = 24
-"""Operands of a sum that is written out."""
+"""Operands of the longest sum that is written out."""
 _SHOWN_TERMS: Final = 3
-"""Operands of a longer sum that are written, from its first."""
+"""Operands that are written of a longer sum, from its first."""
 _MOST_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
 _SUPPORTS: Final = 1e-4
-"""Largest relative error of a written difference, caused by the digits that it does not show."""
+"""Largest relative error of a written difference, caused by the digits that it does not show [1]."""
 
 
 def against(left: float, sign: str, right: float) -> str:
-    """Write a comparison with enough digits to see that it holds.
+    """A comparison with enough digits to see that it holds.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def against(left: float, sign: str, right: float) -> str:
 
 
 def less(left: float, right: float) -> str:
-    """Write a difference with enough digits to reproduce its result.
+    """A difference with enough digits to reproduce its result.
 
     Examples
     --------
@@ -50,14 +50,7 @@ def less(left: float, right: float) -> str:
 
 
 def formula_text(operand: Number, *, in_numbers: bool) -> str:
-    """Write the expression of a number in terms of named numbers.
-
-    Parameters
-    ----------
-    operand
-        A computed number.
-    in_numbers
-        If True, write values instead of symbols.
+    """Expression of a computed number in terms of named numbers: their symbols, or their values.
 
     Examples
     --------
@@ -102,7 +95,7 @@ def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[s
 
 
 def _chained(operand: Traced) -> list[Number]:
-    """The operands of a sum, or of the largest or smallest of several; of other operations none."""
+    """Operands of a sum, or of the largest or smallest of several; none for other operations."""
     if operand.operation not in ("add", "larger", "smaller"):
         return []
     operands: list[Number] = []
@@ -114,7 +107,7 @@ def _chained(operand: Traced) -> list[Number]:
 
 
 def _shortened(name: str, terms: Sequence[Number], *, in_numbers: bool) -> tuple[str, int]:
-    """The first operands and the last: nobody reads a sum of hundreds."""
+    """First operands and last one, since nobody reads a sum of hundreds."""
     operation = OPERATIONS[name]
     written = [_written(term, in_numbers=in_numbers)[0] for term in (*terms[:_SHOWN_TERMS], terms[-1])]
     written.insert(-1, f"... {len(terms) - len(written)} more ...")
@@ -148,7 +141,7 @@ def _atom(text: str) -> tuple[str, int]:
 
 
 def formula_of(equation: Equation) -> str:
-    """Write an equation in symbols by computing it with traced numbers.
+    """An equation in symbols, from computing it with traced numbers.
 
     Examples
     --------
@@ -157,7 +150,7 @@ def formula_of(equation: Equation) -> str:
     'hop H + 0.25'
     """
     names = list(signature(equation.function).parameters)
-    # Any number but 0 and 1, which truth values equal.
+    # Any number but 0 and 1, which equal truth values.
     first, *rest = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
     with constants_looked_up(TracedConstant):
         result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
@@ -165,7 +158,7 @@ def formula_of(equation: Equation) -> str:
 
 
 def lines(figure: Traced) -> Iterator[Traced]:
-    """Every named number behind a figure, in the order of computation; the figure is last."""
+    """Named numbers behind a figure, in the order of computation; the figure is last."""
     yield from (number for number in _visit(figure) if not number.given and (number.symbol or number is figure))
 
 
@@ -180,7 +173,7 @@ def inputs(figure: Traced) -> Iterator[Input]:
 
 
 def _visit(figure: Traced) -> Iterator[Traced]:
-    """Every number behind a figure once, its parts before it; a sum of thousands is deeper than Python recurses."""
+    """Numbers behind a figure, each once, its parts before it. A sum of thousands is deeper than Python recurses."""
     seen: set[int] = set()
     waiting = [(figure, False)]
     while waiting:

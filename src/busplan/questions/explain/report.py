@@ -35,12 +35,12 @@ _INPUTS: Final = (
     TableColumn("grade", kind="words", rank=3, leaves="below"),
     TableColumn("source", kind="words", rank=4, leaves="below", wraps=True),
 )
-"""Columns of an input, and of how well it is known."""
+"""Columns of an input and its grade."""
 _KNOWN: Final = tuple(
     column._replace(is_detail=True) if column.heading == "source" else column._replace(leaves="out")
     for column in _INPUTS
 )
-"""The same, the source only in a whole answer."""
+"""Columns of an input, with the source only in a whole answer."""
 _MOST_INPUTS: Final = 8
 """Inputs in an answer that is not whole."""
 _SYMBOL: Final = TableColumn("symbol", kind="words", rank=1, leaves="below")
@@ -60,7 +60,7 @@ _FIGURES: Final = (
 
 
 def assumptions_report(answer: ExplainAnswer) -> Report:
-    """Report of `explain PROFILE`: what the verdict rests on, and the figures that can be explained."""
+    """Report of `explain PROFILE`: the inputs on which the verdict rests, and the figures that can be explained."""
     profile, assumptions, figures = answer.profile, answer.assumptions, answer.figures
     inputs = (
         TableRow((*_input_cells(given), given.meaning), is_detail=number >= _MOST_INPUTS)
@@ -96,15 +96,7 @@ def assumptions_report(answer: ExplainAnswer) -> Report:
 
 
 def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:
-    """Report of `explain PROFILE FIGURE` with a section for each derivation.
-
-    Parameters
-    ----------
-    name
-        Name of the profile.
-    derivations
-        One or more.
-    """
+    """Report of `explain PROFILE FIGURE`, with a section for each of one or more derivations."""
     figures = dict.fromkeys(derivation.figure.key for derivation in derivations)
     return Report(
         Sentence(("Where ", Code(", ".join(figures)), " of ", Code(name), " comes from")),
@@ -128,7 +120,7 @@ def _record(derivation: Derivation) -> Record:
 
 
 def _step_records(derivation: Derivation) -> Iterator[Record]:
-    """One row for each step; a figure that is itself an input has one row, without a formula."""
+    """Rows of steps; a figure that is itself an input has one row, without a formula."""
     figure = derivation.figure
     itself = Step(figure.key, figure.symbol, figure.reference, "", "", derivation.value, figure.unit)
     for number, step in enumerate(derivation.steps or (itself,), start=1):
@@ -142,7 +134,7 @@ def _step_records(derivation: Derivation) -> Iterator[Record]:
 
 
 def _sections(name: str, derivations: Iterable[Derivation]) -> Iterator[Chapter]:
-    """A section for each derivation; inputs that several have stand once."""
+    """Sections of derivations; inputs that several share are listed once."""
     first: dict[tuple[Input, ...], Derivation] = {}
     for derivation in derivations:
         earlier = first.setdefault(derivation.inputs, derivation)
@@ -156,7 +148,7 @@ def _of(derivation: Derivation) -> str:
 
 
 def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
-    """The result, its meaning, every step to it, and the inputs below them."""
+    """Section with the result, its meaning, every step to it, and the inputs below them."""
     figure = derivation.figure
     period = () if derivation.period_us is None else (" at ", period_value(derivation.period_us))
     result = _result(derivation.value, figure.key, figure.unit)
@@ -170,11 +162,11 @@ def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
 
 
 _MOST_STEPS: Final = 4
-"""Steps of a derivation that any answer shows whole."""
+"""Steps of the longest derivation that every answer shows whole."""
 
 
 def _last_step(derivation: Derivation) -> Iterator[Block]:
-    """The last step, the steps that it takes its numbers from, and the inputs that are known the least."""
+    """Last step, the steps from which it takes its numbers, and the inputs that are known the least."""
     *before, last = derivation.steps or (None,)
     if last is not None:
         used = [step for step in before if re.search(rf"(?<!\w){re.escape(step.symbol)}(?!\w)", last.formula)]
@@ -194,7 +186,7 @@ def _last_step(derivation: Derivation) -> Iterator[Block]:
 
 
 def _plays_a_part(given: Input, derivation: Derivation) -> bool:
-    """Whether an input plays a part in a figure of a transaction: one of a message that no step names does not."""
+    """Whether an input matters to a transaction's figure. One of a message that no step names does not."""
     section, _, rest = given.name.partition(".")
     name = rest.rpartition(".")[0]
     if section != "message" or derivation.transaction in (None, name):
@@ -207,7 +199,7 @@ def _result(value: object, key: str, unit: str) -> ShownValue | Words:
 
 
 def _step(step: Step) -> CalculationStep:
-    """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
+    """A line in symbols and one in numbers, without a line that repeats its neighbour."""
     result = _result(step.value, step.key, step.unit)
     text = result.text if isinstance(result, Words) else figure_text(result)
     formula = "" if step.formula in (step.symbol, text) else step.formula

@@ -27,7 +27,7 @@ _FRAMES: Final = ("cycle_frames_us", "cycle_data_us")
 _NONPERIODIC: Final = "cycle.nonperiodic_us"
 _ROUNDING_US: Final = 1e-6
 _ROWS: Final = {"ethercat": ethercat.rows, "can": can.rows}
-"""Lines of the profile, by kind of bus."""
+"""Lines of the profile by kind of bus."""
 _COLUMNS: Final = (
     *(TableColumn(heading, kind="words") for heading in ("key", "value", "grade", "file and line")),
     TableColumn("note", kind="words", rank=1, wraps=True),
@@ -36,30 +36,20 @@ _COLUMNS: Final = (
 
 @dataclass(frozen=True, slots=True, repr=False)
 class ImportAnswer(Answer):
-    """Answer of `import_profile`.
-
-    Parameters
-    ----------
-    profile
-        The profile.
-    text
-        Its TOML: each value has its grade, file and line in a comment.
-    rows
-        Its values.
-    remarks
-        Sentences on what the files say otherwise, or leave open.
-    card
-        Lines of the card of `capacity`.
-    """
+    """Answer of `import_profile`."""
 
     profile: Profile
     text: str
+    """TOML of the profile; a comment has the grade, file and line of each value."""
     rows: tuple[ProfileLine, ...]
+    """Values of the profile."""
     remarks: tuple[str, ...]
+    """Sentences on what the files contradict or leave open."""
     card: tuple[str, ...]
+    """Lines of the card of `capacity`."""
 
     def sentences(self) -> tuple[str, ...]:
-        """What files say otherwise or leave open, the card of `capacity`, and what stays unknown."""
+        """Contradictions and gaps of the files, the card of `capacity`, and values that stay unknown."""
         return (*self.remarks, *self.card, *self._unknown())
 
     def report(self) -> Report:
@@ -83,7 +73,7 @@ class ImportAnswer(Answer):
         )
 
     def _unknown(self) -> tuple[str, ...]:
-        """Values that nobody has measured or configured; groups share a line, and messages do."""
+        """Values that nobody has measured or configured. Groups share a line, and messages do."""
         unknown: dict[str, dict[str, None]] = {}
         for row in self.rows:
             if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade", "period_grade"):
@@ -120,17 +110,17 @@ def import_profile(
     name
         Name of the profile; by default that of the first file.
     bus
-        Of a database of several buses, the name of one.
+        Name of the bus in a database of several.
     channel
-        Of a log of several channels, the name of one.
+        Name of the channel in a log of several.
     period_us
-        Period of every message that no file gives one; it is assumed, so the plan is not shown to fit [us].
+        Period of every message without one in a file [us]. It is assumed, so the plan is not shown to fit.
     nodes
-        Nodes that an EDS stands for: their number, from node-ID 1 on, or their node-IDs; as text "8" or "1-8,11".
+        Nodes that an EDS describes: their number, from node-ID 1 on, or their node-IDs, as text "8" or "1-8,11".
     bit_rate_kbit_s
-        Bit rate of a CAN bus, before that of any file; of a log that does not show it, none can be left out [kbit/s].
+        Bit rate of a CAN bus, instead of that of any file [kbit/s]; required for a log that does not show it.
     progress
-        Called with the bytes read of a log and the size of the file [bytes].
+        Function called with the bytes read of a log and the size of its file [bytes].
 
     Returns
     -------
@@ -140,8 +130,8 @@ def import_profile(
     Raises
     ------
     BusplanError
-        A file cannot be read or is of no known format, files are of different machines, what a profile must have is in
-        none of them, or two files are logs.
+        A file cannot be read or is of no known format, files are of different machines, no file has what a profile
+        must have, or two files are logs.
 
     References
     ----------
@@ -185,7 +175,7 @@ def import_profile(
 
 
 def _require_files(readings: Sequence[Reading], *, bus: str | None, channel: str | None, has_nodes: bool) -> None:
-    """Refuse options that no file answers to, and two logs."""
+    """Raise BusplanError for options that apply to no file, and for two logs."""
     described = [reading.file for reading in readings if reading.nodes and reading.kind == "can"]
     if has_nodes and len(described) != 1:
         found = f"{described[0]} and {described[1]} are both" if described else "none of the files is"
@@ -200,7 +190,7 @@ def _require_files(readings: Sequence[Reading], *, bus: str | None, channel: str
 
 
 def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
-    """The load of the plan beside that of the log."""
+    """Words on the load of the plan beside that of the log."""
     bus: Any = profile.bus
     cycle: Any = deciding_cycle(network_of(profile))
     planned = float(cycle.load)
@@ -223,7 +213,7 @@ def _validated(text: str, machine: Reading) -> Profile:
 
 
 def _time_beyond(profile: Profile, machine: Reading) -> ProfileLine | None:
-    """Time by which the frames of a file are longer than the frames of the profile; None if they are not."""
+    """Excess of the frames of a file over those of the profile, as a line [us]; None without excess."""
     frames = machine.bus["frames"]
     file_us = sum(map(ethercat.frame_us, frames.value))
     terms = deciding_cycle(network_of(profile)).terms

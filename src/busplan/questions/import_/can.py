@@ -1,4 +1,4 @@
-"""The profile of a CAN bus: CANopen nodes in groups, and all other messages."""
+"""Profile of a CAN bus: CANopen nodes in groups, and all other messages."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
@@ -34,30 +34,30 @@ _SYNC_ID: Final = 0x80
 _MOST_NODE: Final = 127
 _HEARTBEAT_ID: Final = 0x700
 _OF_THE_HOST: Final = (0x000, 0x100)
-"""Identifiers of NMT and TIME in the predefined connection set (CiA 301); that of SYNC is in the profile."""
+"""Identifiers of NMT and TIME in the predefined connection set (CiA 301). That of SYNC is in the profile."""
 _BY_THE_NODE: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, _HEARTBEAT_ID)
 _BY_THE_HOST: Final = (0x200, 0x300, 0x400, 0x500, 0x600)
-"""What each is added to a node-ID in that set: emergency, TPDOs, SDO and heartbeat; RPDOs and SDO."""
+"""Offsets from a node-ID in that set: emergency, TPDOs, SDO and heartbeat; RPDOs and SDO."""
 _EMERGENCY_US: Final = 1_000_000.0
-"""An event of a fault, sent once for each: one in a second is assumed [us]."""
+"""Assumed time between two emergencies of a node, which it sends once for each fault [us]."""
 BIT_RATE: Final = "bit_rate_kbit_s"
 LEAST, SHOWN, ASK = "least_bit_rate", "shown_bit_rate", "ask_bit_rate"
-"""What a log alone says of the bit rate: the least, the one that its frames show, or the question for it."""
+"""Keys for a log's own bit rate: the least possible one, the one that its frames show, or the question for it."""
 FULLEST, SENT = "fullest", "sent"
-"""The fullest second of a log; stamps of a message in it, with their step [us]."""
+"""Keys for the fullest second of a log, and for the stamps of a message in it, with their step [us]."""
 MOST_OF_FULLEST: Final = 1.2
-"""Most load of the plan of a log, by that of its fullest second, where its messages come at the same times."""
+"""Largest load of a log's plan over that of its fullest second, in which its messages come at the same times [1]."""
 _MOST_JITTER: Final = 0.5
-"""Most jitter of a periodic message whose deadline is its period, in periods."""
+"""Largest jitter of a periodic message whose deadline is its period [periods]."""
 _CLEARLY: Final = 0.02
-"""By how much a recorded period is shorter than that of a database where it counts, as a share."""
+"""Share by which a recorded period must be shorter than a database's to count [1]."""
 _DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
 DATA_BIT_RATE: Final = 2000.0
-"""Data bit rate of CAN FD, where no file says it [kbit/s]."""
+"""Data bit rate of CAN FD that no file gives [kbit/s]."""
 _USUAL_BIT_RATE: Final = 1000
-"""Bit rates of machines [kbit/s]."""
+"""Usual bit rate of machines [kbit/s]."""
 _USUAL_OF_CARS: Final = 500
-"""Bit rates of networks of messages alone [kbit/s]."""
+"""Usual bit rate of networks of messages alone [kbit/s]."""
 _LISTED: Final = 8
 _NAMES_OF_CYCLE: Final = ("SYNC", "loop", "feedback", "command")
 _OF_A_MESSAGE: Final = ("sender", "payload_bytes", "period_us", "period_grade", "jitter_us", "burst", "deadline_us")
@@ -70,15 +70,15 @@ class MostLoad(NamedTuple):
     """The fullest second of a log."""
 
     load: Callable[..., float]
-    """Its load by the bit rate and the data bit rate [kbit/s], each frame as long as the longest of its identifier."""
+    """Load by the bit rate and the data bit rate [kbit/s], each frame as long as the longest of its identifier."""
     seconds: int
-    """Seconds of the log that have frames [1]."""
+    """Seconds of the log with frames [1]."""
     of_seconds: int
-    """All seconds of the log, the last one begun [1]."""
+    """All seconds of the log, the partial last one included [1]."""
 
 
 def timing_facts(model: "EventModel", period_us: float, place: str, *, is_periodic: bool) -> Iterator[tuple[str, Fact]]:
-    """Jitter and burst of a message by a log, and that it has no deadline where that is not its period."""
+    """Jitter and burst of a message by a log; and that it has no deadline, where that is not its period."""
     burst, jitter_us = model
     if jitter_us:
         note = "of the arrival, the wait for other frames in it" if is_periodic else "the soonest after another"
@@ -95,21 +95,19 @@ class _Node(NamedTuple):
     number: int
     facts: Facts
     sent: dict[str, list[Pdo]]
-    """PDOs of each direction that go in one payload."""
+    """PDOs of each direction that share one payload."""
 
     @property
     def every(self) -> int:
-        """They go with every n-th SYNC."""
+        """Number n of the PDOs, which go with every n-th SYNC."""
         return self.sent["feedback"][0].every
 
 
 def rows(machine: Reading) -> Iterator[ProfileLine]:
-    """Lines of the profile, without its head: of messages alone, where no node has PDOs with SYNC both ways.
+    """Lines of the profile, without its head; of messages alone if no node has PDOs with SYNC both ways.
 
-    Raises
-    ------
-    BusplanError
-        There are no messages either, or a log of them shows no bit rate and none is given.
+    Without messages, too, it raises BusplanError; also if only a log has them, no bit rate is given and the log shows
+    none.
     """
     bus, nodes = machine.bus, list(_nodes(machine))
     _require_slaves(machine)
@@ -149,7 +147,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
 
 
 def _require_slaves(machine: Reading) -> None:
-    """Refuse a master alone: what is sent stands in the files of its slaves; name those that are missing."""
+    """Raise BusplanError for a master alone, which names the missing slaves: their files say what is sent."""
     missing = [str(number) for number in machine.slaves if number not in machine.nodes or len(machine.nodes) == 1]
     if not missing:
         return
@@ -164,7 +162,7 @@ def _require_slaves(machine: Reading) -> None:
 
 
 def _cycle_words(machine: Reading) -> str:
-    """What of a cycle of SYNC and PDOs messages have, by the identifiers of CANopen's predefined set (CiA 301)."""
+    """Words on a cycle of SYNC and PDOs among messages, by the identifiers of CANopen's predefined set (CiA 301)."""
     feedback, command = ({number - start for number in machine.messages} for start in (0x180, 0x200))
     nodes = sorted(number for number in feedback & command if 1 <= number <= _MOST_NODE)
     if _SYNC_ID not in machine.messages or not nodes:
@@ -174,7 +172,7 @@ def _cycle_words(machine: Reading) -> str:
 
 
 def _period(machine: Reading) -> Fact:
-    """The period of SYNC: as a log has it where no file says it, or where it is shorter there."""
+    """Period of SYNC from the files; from a log if no file has it, or if it is shorter there."""
     stated, seen = machine.bus.get("period_us"), machine.messages.get(_sync_id(machine), {}).get("period_us")
     if stated is None:
         return seen or usual_period("can")
@@ -187,7 +185,7 @@ def _sync_id(machine: Reading) -> int:
 
 
 def _nodes(machine: Reading) -> Iterator[_Node]:
-    """Nodes whose PDOs go with every n-th SYNC in both directions, the most often; all other PDOs become messages."""
+    """Nodes whose PDOs go with every n-th SYNC in both directions, for the least n; other PDOs become messages."""
     for number, facts in sorted(machine.nodes.items()):
         rates = (set.intersection(*({pdo.every for pdo in facts[key].value} for key in _DIRECTIONS))) - {0}
         if rates:
@@ -196,7 +194,7 @@ def _nodes(machine: Reading) -> Iterator[_Node]:
 
 
 def _together(pdos: list[Pdo]) -> list[Pdo]:
-    """The first PDOs that are those of one payload: no more than four, identifiers 256 apart."""
+    """First PDOs of one payload: no more than four, with identifiers 256 apart."""
     together = pdos[:1]
     for pdo in pdos[1:_MOST_PDOS]:
         if pdo.identifier != together[-1].identifier + _PDO_STEP:
@@ -206,7 +204,7 @@ def _together(pdos: list[Pdo]) -> list[Pdo]:
 
 
 def _looks(place: int, node: _Node) -> tuple[Any, ...]:
-    """What neighbours of one group share: sizes, axes, and identifiers that go up by one."""
+    """Features that neighbours of one group share: sizes, axes, rate, and identifiers that go up by one."""
     sizes = (tuple(pdo.payload_bytes for pdo in node.sent[key]) for key in _DIRECTIONS)
     starts = (node.sent[key][0].identifier - place for key in _DIRECTIONS)
     return (*sizes, *starts, node.every, node.facts["axes"].value)
@@ -238,18 +236,10 @@ def _group(name: str, nodes: list[_Node]) -> Iterator[ProfileLine]:
 def _messages(
     machine: Reading, nodes: Sequence[_Node], owners: dict[int, str], *, usual_bits: int
 ) -> Iterator[ProfileLine]:
-    """Every message that is in no cycle: of databases and logs, PDOs that the cycle has not, heartbeats, emergencies.
+    """Messages outside the cycle: of databases and logs, other PDOs, heartbeats, emergencies.
 
-    Parameters
-    ----------
-    machine
-        What the files say.
-    nodes
-        Nodes in the cycle; with any, SYNC is no message.
-    owners
-        The group of each of them by its node-ID.
-    usual_bits
-        Length of identifiers that a message need not say [bits].
+    With any node in the cycle, SYNC is no message. `owners` are the groups of nodes by node-ID. `usual_bits` is the
+    length of identifiers that a message need not give [bits].
     """
     taken = set(_NAMES_OF_CYCLE)
     cycle = {node.number: [pdo for pdos in node.sent.values() for pdo in pdos] for node in nodes}
@@ -283,7 +273,7 @@ def _messages(
 
 
 def _of_node(number: int, node: Facts, cycle: Sequence[Pdo], period: Fact) -> Iterator[Facts]:
-    """Messages of a CANopen node beside the PDOs of its cycle."""
+    """Messages of a CANopen node besides the PDOs of its cycle."""
     name = f"{node['name'].value}-{number}"
     for pdo in (pdo for key in _DIRECTIONS for pdo in node[key].value if pdo not in cycle):
         facts = {
@@ -317,7 +307,7 @@ def _of_node(number: int, node: Facts, cycle: Sequence[Pdo], period: Fact) -> It
 
 
 def _joined(facts: Facts, machine: Reading) -> Facts:
-    """A message of a node with what a database and a log say of it: its name, and how often it was seen."""
+    """A node's message with its facts from a database and a log: its name, and how often it was seen."""
     number = facts["identifier"].value
     seen = dict(machine.messages.get(number, {}))
     if not seen:
@@ -340,7 +330,7 @@ def _joined(facts: Facts, machine: Reading) -> Facts:
 
 
 def _shown_senders(machine: Reading, owners: dict[int, str]) -> dict[int, tuple[str, str]]:
-    """Who sends an identifier, and how that is known: by the nodes' files, else by the predefined connection set."""
+    """Sender of each identifier, and the source for it: the nodes' files, else the predefined connection set."""
     devices = {
         number: HOST if "is_host" in facts else owners.get(number, f"{facts['name'].value}-{number}"[:100])
         for number, facts in machine.nodes.items()
@@ -351,7 +341,7 @@ def _shown_senders(machine: Reading, owners: dict[int, str]) -> dict[int, tuple[
             shown |= {start + number: (sender, f"of node {number} by the predefined set") for start in starts}
     for number, facts in machine.nodes.items():
         shown |= {pdo.identifier: (HOST, f"to node {number}") for pdo in facts["command"].value}
-    # What a node sends to another is no command of the host.
+    # Data that a node sends to another are no command of the host.
     for number, facts in machine.nodes.items():
         sent = [pdo.identifier for pdo in facts["feedback"].value]
         sent += [facts["emergency"].value] if "emergency" in facts else []
@@ -360,9 +350,9 @@ def _shown_senders(machine: Reading, owners: dict[int, str]) -> dict[int, tuple[
 
 
 def _set_senders(messages: Sequence[Facts], machine: Reading, owners: dict[int, str]) -> None:
-    """Say of each message that CANopen shows to be of a node its group, the node, or the host.
+    """Give each message that CANopen shows to be of a node its group, its node or the host.
 
-    Who sends one of them in a database is that node in its other messages, too.
+    A node that sends one of them in a database sends its other messages there, too.
     """
     shown = _shown_senders(machine, owners)
     known: dict[object, set[str]] = {}
@@ -388,7 +378,7 @@ def _is_fd(facts: Facts) -> bool:
 
 
 def _obstacle(facts: Facts) -> str:
-    """Reason that a message is left out; empty if there is none."""
+    """Reason why a message is left out; empty for none."""
     most_bytes, why = (_FD_BYTES, "") if _is_fd(facts) else (_FRAME_BYTES, ", and no file says that it is CAN FD")
     if facts["payload_bytes"].value > most_bytes:
         return f"over the {most_bytes} bytes of a frame{why}"
@@ -396,7 +386,7 @@ def _obstacle(facts: Facts) -> str:
 
 
 def _message(facts: Facts, usual_bits: int) -> dict[str, Fact | None]:
-    """The section of a message."""
+    """Section of a message in the profile."""
     identifier, switches = facts["identifier"], facts.get("switches")
     number = identifier.value % EXTENDED
     bits = _EXTENDED_BITS if identifier.value >= EXTENDED else _BASE_BITS
@@ -415,10 +405,10 @@ def _left_out(reason: str, names: list[str]) -> str:
 
 
 def settle(readings: Sequence[Reading]) -> None:
-    """Settle what a log and the databases beside it say of the same: the log says what is sent, and how often.
+    """Settle contradictions between a log and databases; the log determines which messages are sent, and how often.
 
-    Of a message the shorter period and the longer data count, and what the log never has is left out. The bit rate is
-    the log's where its frames show one, or need more than a database says.
+    The shorter period and the longer data of a message count, and messages that the log never has are left out. The bit
+    rate is the log's if its frames show one, or need more than a database has.
     """
     for log in (reading for reading in readings if reading.is_log):
         for database in (reading for reading in readings if reading is not log):
@@ -433,7 +423,7 @@ def settle(readings: Sequence[Reading]) -> None:
 
 
 def assume_periods(machine: Reading, period_us: float) -> None:
-    """Give every message without a period one that is assumed [us]."""
+    """Give every message without a period an assumed one [us]."""
     for facts in machine.messages.values():
         if "period_us" not in facts:
             facts["period_us"] = assumed(period_us, "no file says it; --period gives it to all such messages")
@@ -456,7 +446,7 @@ def _settle_message(recorded: Facts, stated: Facts, log: Reading) -> None:
             f"{period.value:,.0f} by {period.place}: the log's is taken"
         )
         return
-    # It comes as early as in the log all the same.
+    # The message comes as early as in the log all the same.
     times_us, error_us = recorded[SENT].value
     # It needs numpy, and most files have no stamps.
     from busplan.recordings.can_timing import event_model
@@ -468,12 +458,9 @@ def _settle_message(recorded: Facts, stated: Facts, log: Reading) -> None:
 
 
 def give_bit_rate(machine: Reading, bit_rate_kbit_s: float) -> None:
-    """Take the bit rate that the user gives [kbit/s].
+    """Set the user's bit rate [kbit/s].
 
-    Raises
-    ------
-    BusplanError
-        Frames of a log need more.
+    If frames of a log need more, it raises BusplanError.
     """
     least = machine.bus[LEAST].value.surely if LEAST in machine.bus else 0.0
     if bit_rate_kbit_s < least:

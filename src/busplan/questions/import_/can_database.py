@@ -1,4 +1,4 @@
-"""Databases of CAN messages, by cantools: DBC, KCD, SYM, ARXML. Identifiers, lengths, cycle times, bit rate."""
+"""Databases of CAN messages, read by cantools: DBC, KCD, SYM, ARXML. Identifiers, lengths, cycle times, bit rate."""
 
 import logging
 import re
@@ -12,7 +12,7 @@ from busplan.questions.import_.reading import Reading, whole_number
 from busplan.questions.import_.xml import parsed
 
 EXTENDED: Final = 1 << 31
-"""Added to the number of a message with an identifier of 29 bits, as DBC has it."""
+"""Flag in the number of a message with an identifier of 29 bits, as in DBC."""
 _MOST_BYTES: Final = 16_000_000
 _NAMED: Final = {
     "dbc": r"\s*BO_ +\d+ +(\w+) *:",
@@ -20,7 +20,7 @@ _NAMED: Final = {
     "kcd": r".*<(?:\w+:)?Message\b[^>]*\bname=\"([^\"]*)\"",
     "arxml": r".*<SHORT-NAME>([^<]*)</SHORT-NAME>",
 }
-"""Where a message's name stands."""
+"""Pattern of a message's name, by format."""
 _TEXT: Final = r"\"(?:[^\"\\]|\\.)*\""
 _SIGNALS: Final = re.compile(
     rf"^[ \t]*(?:SG_ [^\n]*$|(?:VAL_|SIG_VALTYPE_|SG_MUL_VAL_) (?:[^\";]|{_TEXT})*;)", re.MULTILINE | re.DOTALL
@@ -30,45 +30,32 @@ _ATTRIBUTE: Final = re.compile(
 )
 _DEFINED: Final = re.compile(r"^[ \t]*BA_DEF_(?:REL_)? +(?:\w+_ +)?\"([^\"\n]*)\"", re.MULTILINE)
 _NUMBERED: Final = re.compile(r"\b(BO_|SG_|BO_TX_BU_|SIG_GROUP_) +(\d{4,9})\b")
-"""A message's number where it is 4 to 9 digits long: without bit 31, which makes it 10."""
+"""Number of a message where it has 4 to 9 digits: it lacks bit 31, which makes it 10."""
 _MESSAGE: Final = re.compile(r"(<(?:\w+:)?Message\b)[^<>]*?\sid\s*=\s*[\"']([^\"'<>]{1,20})[\"'][^<>]*>")
 _MOST_STANDARD: Final = (1 << 11) - 1
 _WHOLE_SIGNAL: Final = re.compile(r"\s*SG_ .*\[.*\].*\"\s*\S")
 _NEXT_STEPS: Final = dict.fromkeys(("dbc", "sym", "kcd"), "export it anew from the tool that wrote it") | {
     "arxml": "save the database as DBC in the tool that wrote it, and give that"
 }
-"""What to do where cantools cannot read a file."""
+"""Advice for a file that cantools cannot read, by format."""
 _LINE: Final = re.compile(r"Invalid syntax at line (\d+), column (\d+)")
 _KILO: Final = 1000
 _LISTED: Final = 8
 _LARGEST_IN_KILO: Final = {"bit_rate_kbit_s": 1000, "data_bit_rate_kbit_s": 8000}
-"""Numbers up to these are in kbit/s, larger ones in bit/s."""
+"""Largest numbers that are in kbit/s; larger ones are in bit/s."""
 _RATES: Final = (
     ("bit_rate_kbit_s", "baudrate", ("Baudrate", "BaudRate")),
     ("data_bit_rate_kbit_s", "fd_baudrate", ("BaudrateCANFD", "BaudRateCANFD")),
 )
-"""Each bit rate: its key, what cantools calls that of a bus, and attributes of a DBC."""
+"""Bit rates: key, cantools' name of it for a bus, and attributes of a DBC."""
 _MOST_BIT_RATE: Final = 10_000_000
 
 
 def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None) -> Reading:
-    """Read a database.
+    """Read a database from text, or from the bytes of XML; `dialect` is dbc, sym, kcd or arxml.
 
-    Parameters
-    ----------
-    given
-        The text, or the bytes of XML.
-    name
-        Name of the file in messages.
-    dialect
-        dbc, sym, kcd or arxml.
-    bus
-        Of several buses, the name of the one that is read.
-
-    Raises
-    ------
-    BusplanError
-        The extra is not installed, the database is not valid, it is of several buses, or it has no messages.
+    `bus` is the name of the one to read of several. BusplanError: the extra is not installed, the database is not
+    valid, has several buses and none is named, or has no messages.
     """
     title = dialect.upper()
     machine = Reading("can", title, name, rank=1, lists_all=False, is_database=True)
@@ -95,7 +82,7 @@ def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None)
         values = {
             "name": message.name or f"id-{message.frame_id:#x}",
             "payload_bytes": message.length,
-            # One of several may not be told from the others.
+            # One of several senders could not be told from the others.
             "sender": message.senders[0] if len(message.senders) == 1 else None,
             "is_fd": message.is_fd or None,
             "period_us": message.cycle_time * _KILO if message.cycle_time else None,
@@ -117,7 +104,7 @@ def _loaded(text: str, machine: Reading, dialect: str) -> Any:
         if last.lstrip().startswith("SG_ ") and not _WHOLE_SIGNAL.match(last):
             raise BusplanError(f"{name}:{text.rstrip().count(chr(10)) + 1}: ends within a signal: cut off?")
         text = _mended(text, machine)
-        # Signals do not matter here, and take most of the time; where they stand otherwise cantools finds them itself.
+        # Signals do not matter here, and take most of the time. In an unusual layout cantools finds them itself.
         with suppress(Exception):
             return load_string(_SIGNALS.sub(_blank, text), dialect, strict=False)
     if dialect == "kcd":
@@ -125,7 +112,7 @@ def _loaded(text: str, machine: Reading, dialect: str) -> Any:
     try:
         return load_string(text, dialect, strict=False)
     except Exception as error:  # noqa: BLE001 - the readers of formats fail in many ways
-        # The words of its errors are about its own code; the place alone is the user's.
+        # Its error messages are about its own code; only the place helps the user.
         position = _LINE.search(str(error))
         place = f"{position[1]}:{position[2]}" if position else "1"
         why = "invalid syntax" if position else "cantools cannot read it"
@@ -133,7 +120,7 @@ def _loaded(text: str, machine: Reading, dialect: str) -> Any:
 
 
 def _mended(text: str, machine: Reading) -> str:
-    """A DBC as cantools takes it, with the same lines: without undefined attributes, or a missing bit 31."""
+    """A DBC as cantools accepts it, with the same lines: without undefined attributes, and with a missing bit 31."""
     defined = set(_DEFINED.findall(text))
     undefined = sorted({name for name in _ATTRIBUTE.findall(text) if name not in defined})
     if undefined:
@@ -151,7 +138,7 @@ def _mended(text: str, machine: Reading) -> str:
 
 
 def _marked(text: str, machine: Reading) -> str:
-    """A KCD whose identifiers over 11 bits have the mark of 29."""
+    """A KCD whose identifiers over 11 bits are marked as 29 bits long."""
     short: set[int] = set()
 
     def marked(match: re.Match[str]) -> str:
@@ -180,7 +167,7 @@ def _blank(match: re.Match[str]) -> str:
 
 
 def _of_one_bus(database: Any, machine: Reading, bus: str | None) -> list[Any]:
-    """Messages of the bus that is asked for, or of the only one."""
+    """Messages of the requested bus, or of the only one."""
     buses = sorted({str(message.bus_name or "") for message in database.messages})
     if bus is None and len(buses) > 1:
         names = ", ".join(buses)
@@ -191,7 +178,7 @@ def _of_one_bus(database: Any, machine: Reading, bus: str | None) -> list[Any]:
 
 
 def _bit_rates(database: Any, messages: list[Any], machine: Reading) -> None:
-    """The bit rates, where the database says them."""
+    """Bit rates of a database that gives them."""
     used = {message.bus_name for message in messages}
     attributes = getattr(database.dbc, "attributes", None) or {}
     for key, of_bus, attribute_names in _RATES:

@@ -48,58 +48,45 @@ from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded,
 _BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
 """Usual bit rates [kbit/s]."""
 _NEAR: Final = 0.02
-"""How far beside a bit rate frames that follow each other at once may seem to be, by their stamps, as a share."""
+"""Share by which frames in direct succession may seem to be off a bit rate, by their stamps [1]."""
 _ABOUT: Final = 0.9
-"""Frames that are this share of a bit rate, or more, seem to follow each other at once."""
+"""Share of a bit rate from which frames seem to be in direct succession [1]."""
 _SHARP: Final = 0.8
-"""Share of them that are at the bit rate itself, where it is that of the bus."""
+"""Share of those frames at the bit rate itself, if it is that of the bus [1]."""
 _LEAST_US: Final = 30.0
-"""No two frames of an identifier are closer [us]."""
+"""Least distance of two frames of an identifier [us]."""
 _MOST_US: Final = 1e8
 """Longest period, so that several of them are no longer than a profile allows [us]."""
 _LONGER: Final = 1.5
-"""Factor from a window to the next one that is tried."""
+"""Factor from one window to the next."""
 _ALWAYS: Final = 0.9
-"""Least share of the log in which a periodic message comes, so that its period is that of the whole log."""
+"""Least share of the log in which a periodic message comes, so that its period is that of the whole log [1]."""
 _ROUNDED: Final = 0.005
-"""Most that the period of a message that is not periodic is rounded, as a share."""
+"""Largest rounding of the period of a message that is not periodic, as a share [1]."""
 _MORE_JITTER: Final = 0.05
-"""Most jitter that rounding a period may add, in periods."""
+"""Largest jitter that rounding a period may add [periods]."""
 
 
 class _Timing(NamedTuple):
-    """When an identifier is sent."""
+    """Timing of an identifier."""
 
     sent: SentFrames
     period_us: float
     model: EventModel
     uncertainty_us: float | None
-    """Expanded uncertainty of the period; None of a message that is not periodic [us]."""
+    """Expanded uncertainty of the period [us]; None for a message that is not periodic."""
 
     @property
     def is_periodic(self) -> bool:
-        """Whether it comes once a period."""
+        """Whether the message comes once a period."""
         return self.uncertainty_us is not None
 
 
 def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> Reading:
-    """Read a log.
+    """Read a log; `channel` is the name of the one to read of several.
 
-    Parameters
-    ----------
-    path
-        The file.
-    name
-        Its name in messages.
-    channel
-        Of several channels, the name of the one that is read.
-    progress
-        Called with the bytes read and the size of the file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        The extra is not installed, or it is no log of one channel that shows when frames come.
+    Progress is called with the bytes read and the size of the file [bytes]. A file that is no log of one channel that
+    shows when frames come raises BusplanError, and so does a missing extra.
     """
     frames = read_can(path, channel=channel, progress=progress)
     if frames.synthetic:
@@ -124,7 +111,7 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
 
 
 def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_kbit_s: float, name: str) -> None:
-    """Refuse a log that does not show when frames come."""
+    """Raise BusplanError for a log that does not show when frames come."""
     often = [sent for sent in messages if len(sent.times_us) >= LEAST_EVENTS]
     if not often:
         raise BusplanError(
@@ -145,12 +132,12 @@ def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_
 
 
 def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Timing]:
-    """An event model of each identifier that allows all its frames, with little more load than the fullest second.
+    """Event models of the identifiers that allow all frames, with little more load than the fullest second.
 
     A periodic message has its period. Any other one has the rate and the burst of its arrival curve at a window of a
-    second. Identifiers that come at different times may so have more load than any second has: then the window grows,
-    for rates fall with it as bursts grow, until the load is `MOST_OF_FULLEST` of the fullest second, or bursts
-    would have grown by more frames than that has.
+    second. Identifiers that come at different times may then have more load than any second has. So the window grows,
+    since rates fall with it as bursts grow, until the load is `MOST_OF_FULLEST` of the fullest second, or bursts would
+    have grown by more frames than that has.
     """
     longest_us = [_longest_us(sent) for sent in messages]
     most = MOST_OF_FULLEST * fullest_load(*_wire_us(messages, longest_us))
@@ -181,12 +168,12 @@ def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Tim
 
 
 def _is_always(sent: SentFrames, stretch: ClockStretch) -> bool:
-    """Whether a periodic message comes nearly all the time of the log."""
+    """Whether a periodic message comes during nearly all of the log."""
     return float(sent.times_us[-1] - sent.times_us[0]) + sent.mean.value >= _ALWAYS * stretch.length_us
 
 
 def _longest_us(sent: SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
-    """The longest frame of an identifier, with the most stuff bits [us]."""
+    """Time on the wire of an identifier's longest frame, with the most stuff bits [us]."""
     switched = max(data_bit_rate_kbit_s, bit_rate_kbit_s) if sent.switches else bit_rate_kbit_s
     us = frame_us(
         sent.most_bytes,
@@ -199,7 +186,7 @@ def _longest_us(sent: SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_
 
 
 def _wire_us(messages: Sequence[SentFrames], longest_us: Sequence[float]) -> tuple[Floats, Floats]:
-    """Stamps of all frames, ascending, and their time on the wire, each as long as the longest of its identifier."""
+    """Stamps of all frames, ascending, and times on the wire, each as of the longest frame of its identifier [us]."""
     times_us = np.concatenate([sent.times_us for sent in messages])
     wire_us = np.repeat(longest_us, [len(sent.times_us) for sent in messages])
     order = np.argsort(times_us, kind="stable")
@@ -207,7 +194,7 @@ def _wire_us(messages: Sequence[SentFrames], longest_us: Sequence[float]) -> tup
 
 
 def _fullest(messages: Sequence[SentFrames], stretch: ClockStretch) -> MostLoad:
-    """Load of the fullest second of the log by bit rates, and how many of its seconds have frames."""
+    """Load of the log's fullest second by bit rates, and number of its seconds with frames."""
 
     def load(bit_rate_kbit_s: float, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
         us = [_longest_us(sent, bit_rate_kbit_s, data_bit_rate_kbit_s) for sent in messages]
@@ -225,14 +212,14 @@ def _periodic(sent: SentFrames, stretch: ClockStretch) -> _Timing:
 
 
 def _steady(sent: SentFrames, stretch: ClockStretch, window_us: float, share: float) -> _Timing:
-    """Rate and burst of the other messages: no less than a share of the mean rate of the log."""
+    """Rate and burst of a message that is not periodic; the rate is at least a share of the log's mean rate."""
     rate = max(steady_rate(sent.times_us, window_us), share * len(sent.times_us) / stretch.length_us)
     period_us = min(max(1 / rate, _LEAST_US), _MOST_US)
     return _covering(sent, period_us, _ROUNDED * period_us, stretch)
 
 
 def _covering(sent: SentFrames, period_us: float, doubt_us: float, stretch: ClockStretch) -> _Timing:
-    """A period, rounded within a doubt, with the jitter or burst that allows all frames."""
+    """A period rounded within a doubt [us], with the jitter or burst that allows all frames."""
     times_us, error_us = sent.times_us, step_us(stretch) if len(sent.times_us) > 1 else 0.0
     least_us = float(ahead(times_us, period_us).max()) + _MORE_JITTER * period_us
 
@@ -244,7 +231,7 @@ def _covering(sent: SentFrames, period_us: float, doubt_us: float, stretch: Cloc
 
 
 def _roundings(value: float, doubt: float) -> Iterator[float]:
-    """Numbers no further from a value than its doubt, those with the fewest digits first; at last one just below it.
+    """Numbers no further from a value than its doubt, those with the fewest digits first, the last one just below it.
 
     Examples
     --------
@@ -296,7 +283,7 @@ def _names(timings: Iterable[_Timing]) -> str:
 def _bit_rate(
     machine: Reading, frames: CanFrames, stretch: ClockStretch, least: LeastBitRate, fullest: MostLoad
 ) -> None:
-    """The bit rate that frames directly after each other show; where they show none, the question for it."""
+    """Bit rate that frames in direct succession show; else the question for it."""
     machine.bus[LEAST] = Fact(least)
     bits, apart_us = frames.bits[stretch.taken][1:], np.diff(stretch.times_us)
     rates = 1000 * bits / np.maximum(apart_us, 1e-3)
@@ -316,6 +303,6 @@ def _bit_rate(
 
 
 def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:
-    """Whether frames follow the ones before as at a bit rate, and hardly any closer or a little later."""
+    """Whether frames follow each other as at a bit rate, with hardly any closer or a little later."""
     near = np.count_nonzero(np.abs(rates / bit_rate_kbit_s - 1) <= _NEAR)
     return bool(near >= LEAST_EVENTS and near >= _SHARP * np.count_nonzero(rates >= _ABOUT * bit_rate_kbit_s))

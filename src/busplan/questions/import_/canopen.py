@@ -19,27 +19,27 @@ _SYNC_ID, _SYNC_PERIOD, _HEARTBEAT, _SYNC_COUNTER = 0x1005, 0x1006, 0x1017, 0x10
 _EMERGENCY, _EMERGENCY_INHIBIT = 0x1014, 0x1015
 _EMERGENCY_ID: Final = 0x80
 _STARTUP, _SLAVES, _IS_MASTER, _IS_SLAVE = 0x1F80, 0x1F81, 1, 1
-"""Objects of the NMT master with their lowest bits: it is the master, and a node is its slave (CiA 302-2)."""
+"""Objects of the NMT master with their lowest bits: the device is the master; a node is its slave (CiA 302-2)."""
 _INVALID: Final = 1 << 31
 _EXTENDED: Final = 1 << 29
 _IDENTIFIER: Final = (1 << 11) - 1
 _EVERY_SYNC, _LAST_SYNC_TYPE = 1, 240
 _MOST_NODE: Final = 127
 _PREDEFINED_PDOS: Final = 4
-"""PDOs of a direction whose identifiers are 0x180 to 0x500 and the node-ID (CiA 301)."""
+"""PDOs of a direction whose identifiers are 0x180 to 0x500 plus the node-ID (CiA 301)."""
 _MOST_MAPPED: Final = 64
 _INHIBIT_US: Final = 100
 _LISTED: Final = 4
 _SYNC_BITS: Final = 47
-"""Shortest frame without data, interframe space included (ISO 11898-1)."""
+"""Shortest frame without data, interframe space included (ISO 11898-1) [bits]."""
 _FASTEST_KBIT_S: Final = 1000
 
 _Section = dict[str, tuple[str, int]]
-"""Text of each value, and its line."""
+"""Text and line of each value."""
 
 
 class _Number(NamedTuple):
-    """A number of the file."""
+    """A number in the file."""
 
     value: int
     line: int
@@ -51,22 +51,19 @@ class Pdo(NamedTuple):
     identifier: int
     payload_bytes: int
     every: int
-    """Sent with every n-th SYNC; 0 where an event sends it."""
+    """Number n of a PDO with every n-th SYNC; 0 for one that an event sends."""
     period_us: float
-    """Shortest time between two frames that events send; 0 where it is not known."""
+    """Shortest time between two frames that events send [us]; 0 if unknown."""
     timer: str
-    """Timer that gives that time, in words for a comment."""
+    """Timer with that time, in words for a comment."""
     place: str
     name: str
 
 
 def node_ids(nodes: str | int | Iterable[int]) -> tuple[int, ...]:
-    """Node-IDs that a number of nodes, or a list of node-IDs, stands for.
+    """Node-IDs, from their number or a list of them.
 
-    Raises
-    ------
-    BusplanError
-        It is neither, or a node-ID is not 1 to 127 or comes twice.
+    Anything else, a node-ID outside 1 to 127, and one that comes twice raise BusplanError.
 
     Examples
     --------
@@ -92,22 +89,10 @@ def node_ids(nodes: str | int | Iterable[int]) -> tuple[int, ...]:
 
 
 def read(text: str, name: str, *, nodes: tuple[int, ...] = ()) -> Reading:
-    """Read an EDS or DCF.
+    """Read an EDS or DCF; `nodes` are the nodes that an EDS describes, one without them.
 
-    Parameters
-    ----------
-    text
-        The text.
-    name
-        Name of the file in messages.
-    nodes
-        Node-IDs of the nodes that an EDS stands for; without them it is one.
-
-    Raises
-    ------
-    BusplanError
-        A number is none, it is a device without PDOs, or a DCF, with a node-ID of its own, stands for other nodes; with
-        its line.
+    BusplanError, with its line: a number is invalid, the device has no PDOs, or a DCF, which has a node-ID of its own,
+    is to describe other nodes.
     """
     sections = _sections(text)
     setup = sections.get("devicecomissioning") or sections.get("devicecommissioning") or {}
@@ -149,7 +134,7 @@ def read(text: str, name: str, *, nodes: tuple[int, ...] = ()) -> Reading:
 
 
 def _node(device: "_Device") -> Facts:
-    """What a node sends and takes. The PDOs of a master are those of its slaves, the other way round."""
+    """Data that a node sends and takes. The PDOs of a master are those of its slaves, in the other direction."""
     machine, words = device.machine, ControlWords()
     if is_master := bool(device.slaves()):
         facts = {"is_host": machine.fact(True, 1), "feedback": machine.fact((), 1), "command": machine.fact((), 1)}
@@ -180,7 +165,7 @@ def _node(device: "_Device") -> Facts:
 
 
 def _require_apart(machine: Reading) -> None:
-    """Refuse identifiers that several nodes have: without $NODEID they are those of one."""
+    """Raise BusplanError for identifiers that several nodes have: without $NODEID they belong to one."""
     owners: dict[int, int] = {}
     for number, facts in machine.nodes.items():
         for pdo in facts["feedback"].value:
@@ -216,15 +201,15 @@ def _bus(device: "_Device", setup: _Section) -> Facts:
 
 
 class _Device:
-    """The objects of a device."""
+    """Objects of a device."""
 
     def __init__(self, sections: dict[str, _Section], machine: Reading) -> None:
         self.sections, self.machine, self.node = sections, machine, 1
         self.off: list[str] = []
-        """PDOs that are not sent, with the reason."""
+        """PDOs that are not sent, each with the reason."""
 
     def number(self, section: _Section, key: str) -> _Number | None:
-        """A number, the node-ID in it added; None where it is missing or empty."""
+        """A number, plus the node-ID where it has that; None if it is missing or empty."""
         text, line = section.get(key, ("", 0))
         if not text:
             return None
@@ -234,7 +219,7 @@ class _Device:
         return _Number(int(match[1], 0) + self.node * ("$nodeid" in text.lower()), line)
 
     def value(self, index: int, sub: int | None = None) -> _Number | None:
-        """Value that an object is set to, else its default; also of an object in the compact form of CiA 306."""
+        """Configured value of an object, else its default; also for an object in the compact form of CiA 306."""
         section = self.sections.get(f"{index:x}" if sub is None else f"{index:x}sub{sub:x}", {})
         value = self.number(section, "parametervalue") or self.number(section, "defaultvalue")
         if value is not None or sub is None:
@@ -248,7 +233,7 @@ class _Device:
         return self.number(self.sections.get(f"{index:x}value", {}), str(sub)) or self.number(whole, "defaultvalue")
 
     def node_of_identifiers(self) -> _Number | None:
-        """The node-ID that all identifiers of PDOs without $NODEID are of, by the predefined connection set."""
+        """Node-ID to which all PDOs' identifiers without $NODEID belong, by the predefined connection set."""
         texts = [
             self.sections.get(f"{first + number:x}sub1", {}).get("defaultvalue", ("", 0))
             for first in (_TPDO, _RPDO)
@@ -259,14 +244,14 @@ class _Device:
         return _Number(nodes.pop(), fixed[0][1]) if len(nodes) == 1 and nodes != {0} else None
 
     def slaves(self) -> tuple[int, ...]:
-        """The master's own node-ID, or those of its slaves where it lists them; none for another device."""
+        """Node-IDs of a master's slaves if it lists them, else its own; none for another device."""
         startup = self.value(_STARTUP)
         listed = ((node, self.value(_SLAVES, node)) for node in range(1, _MOST_NODE + 1))
         slaves = tuple(node for node, entry in listed if entry and entry.value & _IS_SLAVE)
         return slaves or ((self.node,) if startup and startup.value & _IS_MASTER else ())
 
     def pdos(self, first: int, words: ControlWords) -> Iterator[Pdo]:
-        """The PDOs of a direction that are sent; control words that they have go into `words`."""
+        """PDOs of a direction that are sent; their control words go into `words`."""
         direction = "TPDO" if first == _TPDO else "RPDO"
         for number in range(_MOST_PDOS):
             identifier = self.value(first + number, 1)
@@ -303,7 +288,7 @@ class _Device:
 
 
 def _sections(text: str) -> dict[str, _Section]:
-    """Keys and values of each section with their lines; names without case."""
+    """Keys and values of each section, with their lines; case does not count in names."""
     sections: dict[str, _Section] = {}
     section: _Section = {}
     for line, content in enumerate(text.split("\n"), start=1):

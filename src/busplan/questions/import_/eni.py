@@ -19,23 +19,23 @@ _MOST_BITS: Final = 8 * 65_536
 _MOST_TIME_NS: Final = 10**12
 _MOST_DEVICES: Final = 65_535
 _MOST_CYCLES: Final = 1000
-"""Longest common multiple of rates that a profile takes."""
+"""Longest common multiple of rates that a profile accepts [cycles]."""
 _SIZES: Final = {"Recv": "read_bytes", "Send": "write_bytes"}
-"""Data of a device in each direction."""
+"""Keys of a device's data, by direction."""
 _OFFSETS: Final = {"Recv": "InputOffs", "Send": "OutputOffs"}
-"""Key of a datagram that says where the data of a direction begin in the process image."""
+"""Keys of a datagram for the start of a direction's data in the process image."""
 
 
 class _Datagram(NamedTuple):
-    """A datagram that is sent in operation."""
+    """A datagram sent in operation."""
 
     code: int
     length: int
-    """Bytes of its data."""
+    """Data of the datagram [bytes]."""
     address: int
-    """Logical address; -1 where there is none."""
+    """Logical address; -1 without one."""
     image: dict[str, range]
-    """Bytes of the process image that it has, by direction."""
+    """Bytes of the process image in the datagram, by direction."""
 
 
 class _Task(NamedTuple):
@@ -47,22 +47,19 @@ class _Task(NamedTuple):
 
     @property
     def period_us(self) -> int:
-        """Its period; 0 where it is not known [us]."""
+        """Period of the task [us]; 0 if unknown."""
         return int(self.period.value) if self.period else 0
 
     @property
     def sizes(self) -> list[list[int]]:
-        """Bytes of each datagram of each frame."""
+        """Sizes of the datagrams of each frame [bytes]."""
         return [[datagram.length for datagram in frame] for frame in self.frames]
 
 
 def read(content: bytes, name: str) -> Reading:
     """Read an ENI file.
 
-    Raises
-    ------
-    BusplanError
-        It is not valid, or says no machine; with its line.
+    One that is not valid, or describes no machine, raises BusplanError with its line.
     """
     root = parsed(content, name=name, skipped=("InitCmds", "StringTable"))
     machine = Reading("ethercat", "ENI", name, rank=0)
@@ -83,7 +80,7 @@ def read(content: bytes, name: str) -> Reading:
 
 
 def _number(element: Element, path: str, machine: Reading, *, most: int) -> Fact | None:
-    """Whole number in an element below this one; None where there is none."""
+    """Whole number in an element below this one; None without one."""
     child = element.first(path)
     if child is None or not child.text.strip():
         return None
@@ -91,7 +88,7 @@ def _number(element: Element, path: str, machine: Reading, *, most: int) -> Fact
 
 
 def _parts(slave: Element, direction: str, machine: Reading) -> Iterator[tuple[range, Fact]]:
-    """Bits of the process image that each part of a device's data has, and its length."""
+    """Bits of the process image with each part of a device's data, and the length of the part."""
     for part in slave.all(f"ProcessData/{direction}"):
         start = _number(part, "BitStart", machine, most=_MOST_BITS)
         length = _number(part, "BitLength", machine, most=8 * _MOST_BYTES)
@@ -106,16 +103,8 @@ def _bytes_of(bits: range) -> range:
 def _device(slave: Element, images: dict[str, set[int]], outputs: list[Element], machine: Reading) -> Facts:
     """Facts of a device.
 
-    Parameters
-    ----------
-    slave
-        Its element.
-    images
-        Bytes of the process image that devices before it have, by direction; its own are added.
-    outputs
-        Variables of the process image.
-    machine
-        The record of the file.
+    `images` are the bytes of the process image of earlier devices, by direction; those of this one are added. `outputs`
+    are variables of the process image.
     """
     info = slave.first("Info") or slave
     title, physics = info.first("Name"), info.first("Physics")
@@ -152,7 +141,7 @@ def _device(slave: Element, images: dict[str, set[int]], outputs: list[Element],
 
 
 def _axes(slave: Element, sent: range | None, outputs: list[Element], machine: Reading) -> Fact:
-    """Axes of a device: the control words of CiA 402 in its PDOs, or among the names of its outputs."""
+    """Axes of a device: control words of CiA 402 in its PDOs, or among the names of its outputs."""
     words, pdos = ControlWords(), list(slave.all("ProcessData/RxPdo"))
     for pdo in [pdo for pdo in pdos if "Sm" in pdo.attributes] or pdos:
         for entry in pdo.all("Entry"):
@@ -170,7 +159,7 @@ def _axes(slave: Element, sent: range | None, outputs: list[Element], machine: R
 
 
 def _cycle(config: Element, slaves: Sequence[Element], machine: Reading) -> None:
-    """The period, and what goes in the frames of a cycle."""
+    """Period, and contents of the frames of a cycle."""
     tasks = sorted((_task(task, machine) for task in config.all("Cyclic")), key=lambda task: task.period_us)
     if tasks and tasks[0].period and tasks[0].period_us:
         machine.bus["period_us"] = tasks[0].period
@@ -185,7 +174,7 @@ def _cycle(config: Element, slaves: Sequence[Element], machine: Reading) -> None
     _frames(config, tasks[0], machine)
     for task in tasks[1:]:
         if has_rates:
-            # All of them are in the cycle in which the tasks meet.
+            # All frames go in the cycle in which the tasks meet.
             machine.bus["frames"].value.extend(task.sizes)
             continue
         machine.bus.setdefault("slower", machine.fact([], task.line)).value.extend(task.sizes)
@@ -224,12 +213,9 @@ def _datagrams(frame: Element, machine: Reading) -> Iterator[_Datagram]:
 
 
 def _rates(slaves: Sequence[Element], tasks: Sequence[_Task], machine: Reading) -> bool:
-    """Give devices of slower tasks their rate, where the file says which devices each task serves.
+    """Give devices of slower tasks their rate, if the file assigns devices to tasks.
 
-    Returns
-    -------
-    bool
-        Whether each device belongs to a single task, and all periods are multiples of the shortest.
+    Returns whether each device belongs to a single task, and all periods are multiples of the shortest.
     """
     shortest_us = tasks[0].period_us
     rates = [task.period_us // shortest_us if shortest_us else 0 for task in tasks]
@@ -251,7 +237,7 @@ def _rates(slaves: Sequence[Element], tasks: Sequence[_Task], machine: Reading) 
 
 
 def _serving(tasks: Sequence[_Task], direction: str, part: range) -> int | None:
-    """Number of the first task with a datagram that has a part of the process image; None where there is none."""
+    """Index of the first task with a datagram that has a part of the process image; None without one."""
     for number, task in enumerate(tasks):
         spans = (datagram.image.get(direction, range(0)) for frame in task.frames for datagram in frame)
         if any(part[0] in span and part[-1] in span for span in spans):
@@ -260,7 +246,7 @@ def _serving(tasks: Sequence[_Task], direction: str, part: range) -> int | None:
 
 
 def _frames(config: Element, task: _Task, machine: Reading) -> None:
-    """Layout and housekeeping, so that the frames of the fastest task come out to the byte."""
+    """Layout and housekeeping with which the frames of the fastest task come out to the byte."""
     states = _mailbox_states(config, machine)
     process: list[_Datagram] = []
     housekeeping: list[int] = []
@@ -274,12 +260,12 @@ def _frames(config: Element, task: _Task, machine: Reading) -> None:
     separate, shared = sum(map(sum, pairs)), sum(map(max, pairs))
     total = sum(datagram.length for datagram in process)
     if any(datagram.code == _LRW for datagram in process) or len(process) < len((_LRD, _LWR)):
-        # A total below the sum of both directions can only be of bytes that both share.
+        # A total below the sum of both directions needs bytes that both share.
         layout = _SHARED if total < separate else _SEPARATE
     else:
         layout = _SPLIT
     needed = shared if layout == _SHARED else separate
-    # Where a frame is full, the profile's next datagram begins a new frame, too.
+    # After a full frame, the profile's next datagram begins a new one, too.
     headers = 2 if layout == _SPLIT else 1
     further = [0] * max(len(process) - headers * len(task.frames), 0)
     gaps, notes = total - needed, [f"{len(process)} datagrams of process data"] if further else []
@@ -296,7 +282,7 @@ def _frames(config: Element, task: _Task, machine: Reading) -> None:
 
 
 def _mailbox_states(config: Element, machine: Reading) -> range:
-    """Logical addresses of the states of mailboxes, which no device's process data are."""
+    """Logical addresses of the states of mailboxes, which belong to no device's process data."""
     start = _number(config, "Master/MailboxStates/StartAddr", machine, most=2**32 - 1)
     count = _number(config, "Master/MailboxStates/Count", machine, most=_MOST_DEVICES)
     return range(start.value, start.value + max(count.value if count else 1, 1)) if start else range(0)

@@ -1,4 +1,4 @@
-"""The profile of an EtherCAT segment: groups of devices that are alike, each value with its grade and place."""
+"""Profile of an EtherCAT segment: groups of alike devices, each value with its grade and place."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -32,10 +32,7 @@ _PER_BYTE: Final = "what each byte adds"
 def rows(machine: Reading) -> Iterator[ProfileLine]:
     """Lines of the profile, without its head.
 
-    Raises
-    ------
-    BusplanError
-        Devices of unknown bytes, or none.
+    No devices, or devices of unknown size, raise BusplanError.
     """
     if not machine.nodes:
         raise BusplanError(f"{machine.file}: no devices")
@@ -82,7 +79,7 @@ def _name(facts: Facts) -> str:
 
 
 def _datagrams(bus: Facts) -> Facts:
-    """Datagrams of the master: from the files, else those that a master of this name is known to send."""
+    """Datagrams of the master from the files, else those that a master of this name is known to send."""
     if "process_data" in bus:
         return {key: bus[key] for key in ("process_data", "housekeeping_bytes")}
     if "master" not in bus:
@@ -98,7 +95,7 @@ def _datagrams(bus: Facts) -> Facts:
 
 
 def _clocks(devices: Sequence[Facts], period: Fact) -> Facts:
-    """Distributed clocks where a device acts at SYNC0, or may, and how late SYNC0 is."""
+    """Distributed clocks if a device acts at SYNC0, or may, and the shift of SYNC0."""
     configured, possible, shifts = (
         [facts[key] for facts in devices if key in facts] for key in ("clock_us", "has_clock", "shift_us")
     )
@@ -109,7 +106,7 @@ def _clocks(devices: Sequence[Facts], period: Fact) -> Facts:
         note = "devices have clocks; whether they act at SYNC0 no file says"
         facts["distributed_clocks"] = Fact(True, possible[0].place, "assumed", note)
     if shifts:
-        # The earliest SYNC0 decides; one at a task is that of the next.
+        # The earliest SYNC0 decides. One at a task is that of the next task.
         soonest = min(shifts, key=lambda shift: shift.value % period.value or period.value)
         share = min(soonest.value % period.value / period.value, _MOST_SHARE)
         note = f"{soonest.value:g} us, {soonest.note or _FROM_TASK}"
@@ -122,21 +119,14 @@ def _clocks(devices: Sequence[Facts], period: Fact) -> Facts:
 
 
 def _looks(facts: Facts) -> tuple[object, ...]:
-    """What neighbours of one group share: bytes, axes, port and rate, and whether their delay is known."""
+    """Features that neighbours of one group share: bytes, axes, port and rate, and whether their delay is known."""
     return (*(facts[key].value if key in facts else None for key in _ALIKE), "delay_us" in facts)
 
 
 def _group(number: int, devices: Sequence[Facts], taken: set[str]) -> Iterator[ProfileLine]:
-    """Lines of devices side by side that are alike; delays are averaged, so that their sum stays.
+    """Lines of alike devices side by side; delays are averaged, so that their sum stays.
 
-    Parameters
-    ----------
-    number
-        Place of the first in the segment.
-    devices
-        Their facts.
-    taken
-        Names of groups before it.
+    `number` is the place of the first one in the segment; `taken` are the names of earlier groups.
     """
     first, last = devices[0], devices[-1]
     section = f"group.{group_name(_name(first), taken)}"
@@ -171,7 +161,7 @@ def _group(number: int, devices: Sequence[Facts], taken: set[str]) -> Iterator[P
 
 
 def frame_us(sizes: Sequence[int]) -> float:
-    """Time of a frame on the wire by the data of its datagrams [us]."""
+    """Time of a frame on the wire, from the data sizes of its datagrams [us]."""
     constants = kind_named("ethercat").constants
     names = ("PREAMBLE_BYTES", "ETHERNET_BYTES", "HEADER_BYTES", "CHECK_BYTES", "GAP_BYTES")
     whole = sum(constants[name] for name in names) + sum(size + constants["DATAGRAM_BYTES"] for size in sizes)

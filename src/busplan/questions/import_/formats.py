@@ -12,10 +12,10 @@ from busplan.progress import Progress
 from busplan.questions.import_.reading import Reading
 
 MOST_BYTES: Final = 32_000_000
-"""Largest file but a recording; the ENI of 500 devices has some 20 MB."""
+"""Size limit of a file that is no recording [bytes]; the ENI of 500 devices has some 20 MB."""
 _LONGEST_LINE: Final = 1000
 _CAPTURE: Final = rb"[\xd4\x4d][\xc3\x3c]\xb2\xa1|\xa1\xb2[\xc3\x3c][\xd4\x4d]|\n\r\r\n"
-"""First bytes of pcap and pcapng."""
+"""First bytes of pcap and pcapng files."""
 _ELSEWHERE: Final = {
     "EtherCATInfo": "an ESI describes a kind of device and no machine; export the ENI of the machine",
     "TcSmProject": "a project of TwinCAT; export its ENI (EtherCAT, Export Configuration File)",
@@ -25,23 +25,11 @@ _ELSEWHERE: Final = {
 def read_machine(
     argument: str, *, bus: str | None, channel: str | None, nodes: tuple[int, ...], progress: Progress
 ) -> Reading:
-    """Read a file.
+    """Read a file; "-" is standard input.
 
-    Parameters
-    ----------
-    argument
-        The file; "-" is standard input.
-    bus, channel
-        Name of the bus of a database, and of the channel of a log.
-    nodes
-        Node-IDs that an EDS stands for.
-    progress
-        Called with the bytes read of a recording and the size of its file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        The file cannot be read, is of no known format or of two, or is not valid, with its place.
+    `bus` and `channel` name the one to read in a database and in a log; `nodes` are the node-IDs that an EDS describes.
+    Progress is called with the bytes read of a recording and the size of its file [bytes]. A file that cannot be read,
+    is of no known format or of two, or is not valid raises BusplanError, with its place.
     """
     name = "<stdin>" if argument == "-" else argument
     content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
@@ -58,19 +46,16 @@ def read_machine(
     elif machine_format.roots:
         reading = read(content, name)
     else:
-        # Values stand further to the front, and patterns take long on endless lines.
+        # Values are nearer to the start, and patterns take long on endless lines.
         text = "\n".join(line[:_LONGEST_LINE] for line in text_of(content).split("\n"))
         reading = read(text, name, nodes=nodes) if machine_format.module == "canopen" else read(text, name)
     return reading
 
 
 def recognised(content: bytes, *, name: str) -> Format:
-    """The format of a file by its content.
+    """Format of a file by its content.
 
-    Raises
-    ------
-    BusplanError
-        It is of no known format or of two, empty, or too large.
+    A file of no known format, of two, or an empty or too large one raises BusplanError.
     """
     formats = matching(content)
     if len(content) > MOST_BYTES and not any(each.head for each in formats):

@@ -1,4 +1,4 @@
-"""Text of the IgH master's tool: `ethercat slaves -v` (ports, measured delays, names) and `ethercat pdos` (bytes)."""
+"""Output of the IgH master's tool: `ethercat slaves -v` (ports, measured delays, names) and `ethercat pdos` (bytes)."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -33,12 +33,9 @@ class _Port(NamedTuple):
 
 
 def read(text: str, name: str) -> Reading:
-    """Read the text of either command, or of both.
+    """Read the output of either command, or of both.
 
-    Raises
-    ------
-    BusplanError
-        No device is named, there are several masters, or a device stands twice; with its line.
+    Without a device, with several masters, or with a device twice it raises BusplanError, with its line.
     """
     is_of_pdos = _SYNC_MANAGER.search(text) is not None
     is_of_slaves = re.search(r"^Port +Type", text, re.MULTILINE) is not None
@@ -56,9 +53,9 @@ def read(text: str, name: str) -> Reading:
 
 
 def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
-    """The numbered lines of each device."""
+    """Lines of each device, numbered."""
     if not _HEADER.search(text):
-        # The tool names the device only where there are several.
+        # The tool names the device only if there are several.
         return {0: [*enumerate(text.split("\n"), start=1)]}
     devices: dict[int, list[tuple[int, str]]] = {}
     masters, device = set(), None
@@ -76,7 +73,7 @@ def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
 
 
 def _described(lines: list[tuple[int, str]], facts: Facts, machine: Reading) -> Iterator[_Port]:
-    """Name, clocks and mailbox of a device into its facts; gives its ports."""
+    """Add name, clocks and mailbox of a device to its facts; yields its ports."""
     for line, content in lines:
         if match := _PORT.match(content):
             if match["link"] == "up" and match["next"] != "-":
@@ -85,7 +82,7 @@ def _described(lines: list[tuple[int, str]], facts: Facts, machine: Reading) -> 
             if match["port"] == "0" and match["type"] in _PORT_TYPES:
                 facts["port"] = machine.fact(_PORT_TYPES[match["type"]], line, "measured")
         elif match := _NAME.match(content):
-            # The order number, where there is one, is the shorter name.
+            # The order number, if there is one, is the shorter name.
             facts.setdefault("name", machine.fact(match[2], line))
         elif _CLOCKS.match(content):
             facts["has_clock"] = machine.fact(True, line, "measured")
@@ -94,7 +91,7 @@ def _described(lines: list[tuple[int, str]], facts: Facts, machine: Reading) -> 
 
 
 def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
-    """Bytes and axes of a device by the entries of its PDOs: each direction in whole bytes."""
+    """Bytes and axes of a device by the entries of its PDOs, each direction in whole bytes."""
     bits, places, words = {"Rx": 0, "Tx": 0}, dict.fromkeys(_DIRECTIONS, lines[0][0]), ControlWords()
     direction = ""
     for line, content in lines:
@@ -111,7 +108,7 @@ def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
 
 
 def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
-    """The measured delay of each device but the first: that of the hop to it, cable included.
+    """Measured delay of each device but the first: that of the hop to it, cable included.
 
     A hop over devices without a clock is shared out evenly among them.
     """

@@ -17,10 +17,7 @@ _MOST_BITS: Final = 8 * 1486
 def read(content: bytes, name: str) -> Reading:
     """Read a configuration of linuxcnc-ethercat.
 
-    Raises
-    ------
-    BusplanError
-        It is not valid, or has several masters; with its line.
+    One that is not valid, or has several masters, raises BusplanError with its line.
     """
     root = parsed(content, name=name)
     machine = Reading("ethercat", "ethercat-conf.xml", name, rank=1, lists_all=False)
@@ -91,18 +88,18 @@ def _device(slave: Element, number: int, machine: Reading) -> None:
 
 
 def _switches(slave: Element) -> bool:
-    """Whether the file switches process data on or off, which the table has not."""
+    """Whether the file switches process data on or off, which the table of terminals does not cover."""
     return any(each.attributes.get("name", "").lower().startswith("enable") for each in slave.all("modParam"))
 
 
 @cache
 def _terminals() -> dict[str, dict[str, int]]:
-    """Bits of the inputs and of the outputs of devices, and axes of drives, by their type."""
+    """Bits of devices' inputs and outputs, and axes of drives, by type of device."""
     table: dict[str, Any] = tomllib.loads((files(__package__) / "terminals.toml").read_text(encoding="utf-8"))
     return {way: table[way] for way in ("inputs", "outputs", "axes")}
 
 
 def _number(element: Element, key: str, machine: Reading, *, most: int) -> Fact | None:
-    """A whole number of an attribute; None where it is missing."""
+    """A whole number of an attribute; None if it is missing."""
     text = element.attributes.get(key)
     return None if text is None else machine.number(key, text, element.line, most=most)

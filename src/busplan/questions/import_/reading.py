@@ -18,25 +18,25 @@ from busplan.sourced import Grade
 _MAY_DIFFER: Final = ("name", "master", "clock_us")
 """Facts that may differ from file to file."""
 _CONTROL_WORDS: Final = range(0x6040, 0xA000, 0x800)
-"""Index of the control word of each axis of a drive (CiA 402), 0x800 apart; terminals have bits at 0x7040, too."""
+"""Indexes of the axes' control words in a drive (CiA 402), 0x800 apart. Terminals have bits at 0x7040, too."""
 _CONTROL_WORD_BITS: Final = 16
 
 Line: TypeAlias = int | str
-"""Number of a line, with ":" and the column where the file has long lines."""
+"""Number of a line, followed by ":" and the column if the file has long lines."""
 
 
 class Fact(NamedTuple):
-    """A value of a machine, how well it is known, and where it stands."""
+    """A value of a machine, with its grade and its place."""
 
     value: Any
     place: str = ""
-    """File and line; empty for what no file says."""
+    """File and line; empty for a value that no file gives."""
     grade: Grade = "published"
     note: str = ""
 
     @property
     def comment(self) -> str:
-        """Grade, note and place, as the comment of a profile's line; empty where there is nothing to say."""
+        """Grade, note and place, as the comment of a profile's line; empty without note and place."""
         rest = ", ".join(filter(None, (self.note, self.place)))
         return printable(f"{self.grade}: {rest}") if rest else ""
 
@@ -45,36 +45,27 @@ Facts = dict[str, Fact]
 
 
 def assumed(value: object, note: str = "") -> Fact:
-    """A value that no file says."""
+    """A value that no file gives."""
     return Fact(value, "", "assumed", note)
 
 
 @dataclass
 class Reading:
-    """Facts of a machine from one file, or from several together.
-
-    Parameters
-    ----------
-    kind
-        Kind of bus.
-    title
-        The format, as messages name it.
-    file
-        Name of the file.
-    rank
-        Where files say different values, that of the smallest rank counts.
-    """
+    """Facts of a machine from one file, or from several together."""
 
     kind: str
     title: str
+    """Name of the format in messages."""
     file: str
+    """Name of the file."""
     rank: int
+    """Rank among files with different values, of which the smallest counts."""
     bus: Facts = field(default_factory=dict)
-    """The bus, its master and its cycle."""
+    """Facts of the bus, its master and its cycle."""
     nodes: dict[int, Facts] = field(default_factory=dict)
-    """Devices by their place in the segment, from 0; CANopen nodes by their node-ID."""
+    """Devices by place in the segment, from 0; CANopen nodes by node-ID."""
     messages: dict[int, Facts] = field(default_factory=dict)
-    """Messages of a CAN bus by their identifier."""
+    """Messages of a CAN bus by identifier."""
     lists_all: bool = True
     """Whether the file lists all devices of the machine."""
     is_log: bool = False
@@ -82,29 +73,26 @@ class Reading:
     is_database: bool = False
     """Whether the file is a database of messages."""
     slaves: tuple[int, ...] = ()
-    """Of the DCF of a CANopen master the node-IDs of its slaves, or its own where it lists none."""
+    """Node-IDs of the slaves of a CANopen master's DCF, or its own if it lists none."""
     remarks: list[str] = field(default_factory=list)
-    """Sentences on what the file says and a profile cannot, or what the file leaves open."""
+    """Sentences on facts that a profile cannot hold, and on gaps in the file."""
 
     def place(self, line: Line) -> str:
         """File and line, for comments."""
         return f"{PurePath(self.file).name}:{line}"
 
     def fact(self, value: object, line: Line, grade: Grade = "published", note: str = "") -> Fact:
-        """A value that stands in a line of the file."""
+        """A value in a line of the file."""
         return Fact(value, self.place(line), grade, note)
 
     def bytes_of(self, bits: int, line: Line) -> Fact:
-        """The whole bytes that data of a device take."""
+        """Size of a device's data in whole bytes [bytes]."""
         return self.fact(ceil(bits / 8), line, note=f"{bits} bits")
 
     def number(self, key: str, text: str, line: Line, *, most: int) -> Fact:
         """A whole number, decimal or as #x1a00 or 0x1a00.
 
-        Raises
-        ------
-        BusplanError
-            Not a whole number from 0 to the largest.
+        A text that is no whole number from 0 to the largest raises BusplanError.
         """
         value = whole_number(text)
         if value is None or not 0 <= value <= most:
@@ -113,7 +101,7 @@ class Reading:
         return self.fact(value, line)
 
     def refusal(self, line: Line, message: str) -> BusplanError:
-        """Make the error for something wrong in the file."""
+        """Error for something wrong in the file."""
         return BusplanError(f"{self.file}:{line}: {message}")
 
 
@@ -124,27 +112,19 @@ def whole_number(text: str) -> int | None:
 
 
 class ControlWords:
-    """Control words of CiA 402 among the outputs of a device: each is an axis."""
+    """Control words of CiA 402 among the outputs of a device, one for each axis."""
 
     def __init__(self) -> None:
         self.lines: dict[int, Line] = {}
-        """Line of each, by the index of its object."""
+        """Line of each control word, by index of its object."""
 
     def add(self, index: int | None, sub: int | None, bits: int | None, line: Line) -> None:
-        """Take an object that is mapped as an output, if it is a control word."""
+        """Add an object mapped as an output, if it is a control word."""
         if index is not None and index in _CONTROL_WORDS and not sub and bits == _CONTROL_WORD_BITS:
             self.lines.setdefault(index, line)
 
     def axes(self, machine: Reading, *, line: Line | None) -> Fact:
-        """Axes of the device.
-
-        Parameters
-        ----------
-        machine
-            The record of the file.
-        line
-            Line of its PDOs; None where the file does not list them.
-        """
+        """Axes of the device; a `line` of None means that the file does not list its PDOs."""
         if line is None:
             return assumed(0, "which PDOs it has no file says")
         if not self.lines:
@@ -153,12 +133,9 @@ class ControlWords:
 
 
 def merged(readings: Iterable[Reading]) -> Reading:
-    """One record of several files of one machine; where they differ, it says so.
+    """One record of several files of one machine, with remarks on their differences.
 
-    Raises
-    ------
-    BusplanError
-        They are of two kinds of bus, or have not the same devices.
+    Files of two kinds of bus, or of different devices, raise BusplanError.
     """
     ranked = sorted(readings, key=lambda reading: reading.rank)
     first = ranked[0]
@@ -180,7 +157,7 @@ def merged(readings: Iterable[Reading]) -> Reading:
             _add(machine.nodes.setdefault(number, {}), facts, f"node {number}: ", differences)
         for number, facts in reading.messages.items():
             known = machine.messages.setdefault(number, {})
-            # Bit 31 is that of identifiers of 29 bits.
+            # Bit 31 marks identifiers of 29 bits.
             shown = f"0x{number % (1 << 31):0{8 if number >> 31 else 3}X}"
             _add(known, facts, f"{(known | facts)['name'].value} ({shown}): ", differences)
         machine.slaves += reading.slaves
@@ -203,7 +180,7 @@ def _add(facts: Facts, new: Mapping[str, Fact], owner: str, differences: dict[st
 
 
 def _require_one_machine(readings: Sequence[Reading]) -> None:
-    """Refuse files of different devices; one that needs not list all may have fewer."""
+    """Raise BusplanError for files of different devices. A file that need not list all may have fewer."""
     complete = max(readings, key=lambda reading: (reading.lists_all, len(reading.nodes)))
     for reading in readings:
         unlisted = reading.nodes.keys() - complete.nodes.keys()
@@ -230,40 +207,40 @@ class ProfileLine(NamedTuple):
     """A line of a profile."""
 
     section: str
-    """bus, cycle, group.NAME, group.NAME.execution or message.NAME."""
+    """Name of the section: bus, cycle, group.NAME, group.NAME.execution or message.NAME."""
     key: str
     fact: Fact
 
     @property
     def dotted(self) -> str:
-        """Its dotted key."""
+        """Dotted key of the line."""
         return f"{self.section}.{self.key}"
 
     @property
     def plain(self) -> Any:
-        """Its value as TOML has it."""
+        """Value as in TOML."""
         return whole(self.fact.value)
 
 
 def lines(section: str, facts: Mapping[str, Fact | None]) -> Iterator[ProfileLine]:
-    """A line for each fact of a section that is known."""
+    """Lines for the known facts of a section."""
     return (ProfileLine(section, key, fact) for key, fact in facts.items() if fact is not None)
 
 
 def execution_lines(group: str, base: Fact, per_byte: Fact) -> Iterator[ProfileLine]:
-    """The section of the execution time of a group, which no file says."""
+    """Section of a group's execution time, which no file gives."""
     facts = {"kind": assumed("linear"), "grade": assumed("assumed"), "base_us": base, "per_byte_us": per_byte}
     return lines(f"{group}.execution", facts)
 
 
 def usual_period(kind: str) -> Fact:
-    """The period that a kind of bus usually has [us]."""
+    """Usual period on a kind of bus [us]."""
     text = kind_named(kind).starter.period
     return assumed(float(text[:-2]) * _UNITS[text[-2:]], "no file says it; usual on this bus")
 
 
 def group_name(text: str, taken: set[str]) -> str:
-    """A name that a profile takes, not used before: letters, digits, - and _.
+    """A name for a group that is valid and not yet taken: letters, digits, - and _.
 
     Examples
     --------
@@ -282,21 +259,9 @@ def group_name(text: str, taken: set[str]) -> str:
 
 
 def profile_text(rows: Sequence[ProfileLine], *, name: str, readings: Sequence[Reading]) -> str:
-    """The text of a profile.
+    """Text of a profile, from lines that are sorted by section; the readings are for its description.
 
-    Parameters
-    ----------
-    rows
-        Lines of the profile; the lines of a section stand together.
-    name
-        Name of the profile.
-    readings
-        Its files, for the description.
-
-    Raises
-    ------
-    BusplanError
-        It is larger than a profile may be.
+    A text larger than a profile may be raises BusplanError.
     """
     sources = ", ".join(f"{PurePath(reading.file).name} ({reading.title})" for reading in readings)
     head = [

@@ -1,4 +1,4 @@
-"""Text of SOEM's `slaveinfo`: bits, delays since the first clock, ports and clocks."""
+"""Output of SOEM's `slaveinfo`: bits, delays since the first clock, ports and clocks."""
 
 import re
 from typing import Final
@@ -16,12 +16,9 @@ _BRANCH, _END = 3, 1
 
 
 def read(text: str, name: str) -> Reading:
-    """Read the text of slaveinfo.
+    """Read the output of slaveinfo.
 
-    Raises
-    ------
-    BusplanError
-        A device is left out, or has no size; with its line.
+    A missing device, or one without size, raises BusplanError with its line.
     """
     machine = Reading("ethercat", "slaveinfo", name, rank=3)
     totals_ns: dict[int, tuple[int, int]] = {}
@@ -58,7 +55,7 @@ def _axes(lines: list[tuple[int, str]], machine: Reading) -> Fact:
 
 
 def _slaves(text: str, machine: Reading) -> list[list[tuple[int, str]]]:
-    """The numbered lines of each device."""
+    """Lines of each device, numbered."""
     slaves: list[list[tuple[int, str]]] = []
     for line, content in enumerate(text.split("\n"), start=1):
         if match := _SLAVE.match(content):
@@ -82,7 +79,7 @@ def _describe(key: str, value: str, line: int, facts: Facts, machine: Reading) -
 
 
 def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine: Reading) -> None:
-    """The delay of each device but the first, from the time of a frame on its way from the first clock to it.
+    """Delay of each device but the first, from the time of a frame on its way from the first clock to it.
 
     That way leads through earlier branches there and back: all devices between a device and its parent.
     """
@@ -101,7 +98,7 @@ def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine:
 
 
 def _parent(number: int, ports: dict[int, int]) -> int:
-    """The device that a device is connected to: devices at an end close the branch that they are on."""
+    """Device to which a device is connected. Devices at an end close their branch."""
     ends = 0
     for before in range(number - 1, 0, -1):
         count = ports.get(before, 2)

@@ -1,4 +1,4 @@
-"""XML of machines: elements with their lines, without entities, bounded in number and depth."""
+"""XML of machines' files: elements with their lines, without entities, bounded in number and depth."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from busplan.errors import BusplanError
 _MOST_DEPTH: Final = 64
 _MOST_ELEMENTS: Final = 1_000_000
 _FAR: Final = 300
-"""Columns that a person counts; some tools write all in one line."""
+"""Columns that a person counts, at most; some tools write all in one line."""
 
 
 @dataclass(slots=True)
@@ -18,43 +18,31 @@ class Element:
     """An element of an XML file."""
 
     tag: str
-    """Without its namespace."""
+    """Tag without its namespace."""
     line: int | str
-    """Its line, with the column if the line is long."""
+    """Line of the element, with the column if the line is long."""
     attributes: dict[str, str]
     children: list["Element"] = field(default_factory=list)
     text: str = ""
-    """Behind its last child."""
+    """Text after the last child."""
 
     def all(self, path: str) -> Iterator["Element"]:
-        """Elements of a path of tags below this one, as "Config/Slave"."""
+        """Elements at a path of tags below this one, as "Config/Slave"."""
         tag, _, rest = path.partition("/")
         for child in self.children:
             if child.tag == tag:
                 yield from child.all(rest) if rest else (child,)
 
     def first(self, path: str) -> "Element | None":
-        """The first element of a path; None if there is none."""
+        """First element at a path; None without one."""
         return next(self.all(path), None)
 
 
 def parsed(content: bytes, *, name: str, skipped: Collection[str] = ()) -> Element:
-    """Read an XML file.
+    """Read an XML file; elements of skipped tags are left out, with all below them.
 
-    Parameters
-    ----------
-    content
-        The file.
-    name
-        Its name in messages.
-    skipped
-        Tags whose elements are left out, with all below them.
-
-    Raises
-    ------
-    BusplanError
-        It is no XML, or has a document type (which is where entities are declared), too many elements, or too many
-        inside each other; with its line.
+    BusplanError, with its line: the file is no XML, has a document type (which declares entities), or has too many
+    elements, or too many inside each other.
     """
     reader = _Reader(name, frozenset(skipped))
     reader.read(content)
@@ -82,7 +70,7 @@ class _Reader:
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
             raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
-        except (ValueError, LookupError) as error:  # an encoding that Python does not know
+        except (ValueError, LookupError) as error:  # Python does not know the encoding.
             raise BusplanError(f"{self.name}:1: not valid XML: {error}") from None
 
     def _refuse(self, message: str) -> BusplanError:
