@@ -8,7 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c
-from busplan.buses.can.frames import SYNC, Stream, place, streams, traffic_of
+from busplan.buses.can.streams import Stream, place, streams
+from busplan.buses.can.traffic import SYNC, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Network
 from busplan.errors import BusplanError

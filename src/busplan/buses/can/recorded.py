@@ -10,9 +10,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.cycle import WORST, can_cycle
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
-from busplan.buses.can.frames import SYNC, Stream, streams
+from busplan.buses.can.streams import Stream, streams
+from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
 from busplan.english import first_of, plural
@@ -163,7 +164,7 @@ class _Log:
 
     def __init__(self, network: Network, frames: CanFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
-        self.cycle = CanCycle(network, WORST)
+        self.cycle = can_cycle(network, WORST)
         self.traffic = self.cycle.traffic
         self.bit_us = bit_us(self.traffic.bit_rate_kbit_s)
         self.edits: dict[str, Any] = {}

@@ -7,18 +7,10 @@ from itertools import chain, combinations, product
 from math import inf
 from typing import Final
 
-from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.cycle import WORST, CanCycle, can_cycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
-from busplan.buses.can.frames import (
-    NOT_BY_PRIORITY,
-    Points,
-    Stream,
-    Traffic,
-    last_identifier,
-    repeated,
-    streams,
-    traffic_of,
-)
+from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
+from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, traffic_of
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
@@ -208,14 +200,19 @@ def _payload_words(network: Network) -> str:
     return f"a PDO of {over.payload_bytes:.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 
+def _usual(network: Network) -> CanCycle:
+    """The cycle with FD frames and bits as long as they should be."""
+    return can_cycle(network, WORST)
+
+
 def _longest(network: Network) -> CanCycle:
     """The cycle with FD frames and bits as long as they may be."""
-    return CanCycle(network, WORST, traffic=traffic_of(network).longest)
+    return can_cycle(network, WORST, traffic=traffic_of(network).longest)
 
 
 def _late_load(network: Network) -> Number:
     """Part of the load that the bits that FD frames may take in addition make [1]."""
-    return _longest(network).load - CanCycle(network, WORST).load
+    return _longest(network).load - _usual(network).load
 
 
 def _when_full(load: float) -> str:
@@ -287,7 +284,7 @@ LIMITS: Final = (
         lambda network: network.profile.most_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         perhaps=_late_load,
-        period=lambda limit, network: (CanCycle(network, WORST) if limit.perhaps else _longest(network)).load_period_us,
+        period=lambda limit, network: (_usual(network) if limit.perhaps else _longest(network)).load_period_us,
         has_rule=True,
     ),
     Limit(
