@@ -1,4 +1,4 @@
-"""CAN, as a kind of bus."""
+"""CAN as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, Final
@@ -152,7 +152,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return can_cycle(network, model)
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose response time it is."""
+        """Whose response time it is, in words."""
         if not network.groups:
             return ", ".join(("worst case of every message", *self.setup_words(network)))
         nodes = "all nodes" if network.is_uniform else "each group"

@@ -1,4 +1,4 @@
-"""Limits of a CAN bus and of CANopen identifiers, and the rules that only CAN has."""
+"""Limits of a CAN bus and of CANopen identifiers, and the rules of CAN alone."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -27,7 +27,7 @@ def _late_messages(traffic: Traffic) -> list[tuple[Stream, float]]:
 
 
 def _deadline_words(network: Network) -> str:
-    """Say of all messages that miss their deadline in one clause, the worst first."""
+    """Clause on all messages that miss their deadline, the worst first."""
     late = sorted(_late_messages(traffic_of(network).longest), key=lambda pair: -pair[1] / pair[0].deadline_us)
     endless = [message.name for message, us in late if us == inf]
     if endless:
@@ -55,7 +55,7 @@ def _slowest(traffic: Traffic) -> Number:
 
 
 _ENDLESS: Final = 1e6
-"""Response over deadline, from which on how late a message is says nothing [1]."""
+"""Response over deadline from which on it is infinite [1]."""
 
 
 def _deadline(network: Network) -> Number:
@@ -64,7 +64,7 @@ def _deadline(network: Network) -> Number:
 
 
 def _late_part(network: Network) -> Number:
-    """Part of that which is only possible: what FD frames take in addition, and all that queues add to J + C [1]."""
+    """Part of the largest response over deadline that longer FD frames, and queues beyond J + C, only may add [1]."""
     traffic = traffic_of(network)
     if not traffic.queues and traffic.longest is traffic:
         return 0.0
@@ -95,7 +95,7 @@ def _senders_words(network: Network) -> str:
 
 
 def _kept_from_us(network: Network, *, is_shown: bool) -> float:
-    """The period from which on deadlines are kept; infinite where none is long enough, or without a cycle [us]."""
+    """Shortest period that keeps all deadlines; infinite where none does, or without a cycle [us]."""
 
     def is_kept(period_us: float) -> bool:
         traffic = traffic_of(network._replace(period_us=period_us))
@@ -119,7 +119,7 @@ _HALVINGS: Final = 44
 
 
 def _collisions(sent: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
-    """Pairs of streams of plain numbers that share identifiers, with the first they share, and how many."""
+    """Pairs of streams of plain numbers that share identifiers, with the first shared one and their number."""
     ordered = sorted((int(stream.first), place) for place, stream in enumerate(sent))
     pairs = [
         sorted((place, behind))
@@ -180,7 +180,7 @@ def _most_identifier(network: Network) -> Number:
 
 
 def _largest_pdo(network: Network) -> Number:
-    """The largest PDO, or one that is as much over the least room of any as one is over its own [bytes]."""
+    """Largest PDO, or one that is as much over the least room of any as one is over its own [bytes]."""
     largest: Number = 0
     for pdos in traffic_of(network).pdos:
         largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - _least_room(network)))
@@ -188,7 +188,7 @@ def _largest_pdo(network: Network) -> Number:
 
 
 def _least_room(network: Network) -> int:
-    """The least that the frames of any PDO may carry [bytes]."""
+    """Least room of the frames of any PDO [bytes]."""
     return min((pdos.most_bytes for pdos in traffic_of(network).pdos), default=0)
 
 
@@ -211,12 +211,12 @@ def _longest(network: Network) -> CanCycle:
 
 
 def _late_load(network: Network) -> Number:
-    """Part of the load that the bits that FD frames may take in addition make [1]."""
+    """Part of the load that longer FD frames and bits add [1]."""
     return _longest(network).load - _usual(network).load
 
 
 def _when_full(load: float) -> str:
-    """Say of a load what comes of it, where it is 1 or more."""
+    """Clause on what a load of 1 or more leads to; empty below."""
     return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
 
 

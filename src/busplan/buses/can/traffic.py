@@ -3,7 +3,7 @@
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache, reduce, wraps
-from typing import Any, Concatenate, Final, Literal, NamedTuple, ParamSpec, TypeAlias, TypeVar
+from typing import Any, Concatenate, Final, Literal, NamedTuple, ParamSpec, TypeAlias, TypeVar, cast
 
 from busplan.buses.can.equations import BASE_BITS, c, frame_us, share_bytes
 from busplan.buses.network import Group, Network
@@ -115,7 +115,7 @@ def kept(
         result: _Result = traffic.results[key]
         return result
 
-    return of_traffic
+    return cast("Callable[Concatenate[Traffic, _Given], _Result]", of_traffic)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

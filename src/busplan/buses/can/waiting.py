@@ -154,8 +154,9 @@ def _cycle_waits(
     lower_us: Sequence[Points],
 ) -> tuple[Points, Points]:
     """Time of a cycle beside some messages, and what blocks in it, as `response.cycle_waits` finds them [us]."""
-    columns = {key: [getattr(message, key) for message in messages] for key in response.Messages._fields[2:]}
-    columns = {"before_us": before_us, "lower_us": lower_us, **columns}
+    columns: dict[str, Sequence[Points]] = {"before_us": before_us, "lower_us": lower_us}
+    of_messages = ("identifiers", "burst", "period_us", "jitter_us", "deadline_us")
+    columns |= {key: [getattr(message, key) for message in messages] for key in of_messages}
     shape = _shape([others_us, bit], *columns.values())
     tables = {key: _table(column, shape) for key, column in columns.items()}
     found = _computing().cycle_waits(most, _row(others_us, shape), _row(bit, shape), response.Messages(**tables))
@@ -434,7 +435,7 @@ def _table(column: Sequence[Points], shape: tuple[int, ...]) -> "NDArray[Any]":
     return np.stack([np.broadcast_to(number, shape).ravel() for number in column], axis=1).astype(float)
 
 
-def _row(number: Points, shape: tuple[int, ...]) -> "NDArray[Any]":
+def _row(number: Points, shape: tuple[int, ...]) -> Any:
     """A number at each point."""
     return _table([number], shape)[:, 0]
 
