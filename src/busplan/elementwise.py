@@ -8,12 +8,13 @@ arrays are.
 import operator
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import wraps
 from itertools import repeat
 from math import ceil, floor, inf, isinf, sqrt
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, ParamSpec, TypeAlias
 
-from busplan.sourced import Input, Sourced, input_of, short
+from busplan.sourced import Input, Sourced, constants_looked_up, input_of, short
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -147,7 +148,37 @@ class Traced:
         return bool(self.value)
 
     def __float__(self) -> float:
-        raise TypeError("a traced number as a plain one has lost its expression")
+        if not self.is_constant:
+            raise TypeError("a traced number as a plain one has lost its expression")
+        return float(self.value)
+
+    def __int__(self) -> int:
+        return int(float(self))
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether no input of the profile is in it."""
+        return not self.given and all(part.is_constant for part in self.parts if isinstance(part, Traced))
+
+
+class TracedConstant(Traced):
+    """A sourced constant as an input of a derivation."""
+
+    __slots__ = ("constant",)
+
+    def __init__(self, constant: Sourced) -> None:
+        super().__init__(float(constant), given=input_of(constant))
+        self.constant = constant
+
+    @property
+    def is_constant(self) -> bool:
+        """True: it is one."""
+        return True
+
+    @property
+    def meaning(self) -> str:
+        """What the constant is, in one line."""
+        return self.constant.meaning
 
 
 def value_of(operand: Number) -> float:
@@ -420,7 +451,8 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
     3
     """
     if any(isinstance(number, Traced) for number in numbers):
-        value = function(*map(value_of, numbers))
+        with constants_looked_up(None):
+            value = function(*map(value_of, numbers))
         return Traced(value, formula=words, numbers=short(value), parts=numbers)
     if all(isinstance(number, _PLAIN) for number in numbers):
         return function(*numbers)
@@ -450,18 +482,29 @@ def named(number: Number, key: str, symbol: str, reference: str = "") -> Number:
     return number.named(key, symbol, reference) if isinstance(number, Traced) else number
 
 
+_Parameters = ParamSpec("_Parameters")
+
+
+def step(symbol: str, key: str = "") -> Callable[[Callable[_Parameters, Number]], Callable[_Parameters, Number]]:
+    """Decorator of a function whose result is a step of a derivation: its key is the function's name, or given."""
+
+    def of_function(function: Callable[_Parameters, Number]) -> Callable[_Parameters, Number]:
+        key_or_name = key or function.__name__.lstrip("_")
+
+        @wraps(function)
+        def with_name(*given: _Parameters.args, **by_name: _Parameters.kwargs) -> Number:
+            return named(function(*given, **by_name), key_or_name, symbol)
+
+        return with_name
+
+    return of_function
+
+
 def worded(number: Number, words: str) -> Number:
     """Say in words where a number comes from, for a derivation; any other number stays as it is."""
     if not isinstance(number, Traced):
         return number
     return Traced(number.value, formula=words, numbers=short(number.value), parts=(number,))
-
-
-def traced_with(constant: Number, number: Number) -> Number:
-    """A constant, traced where a number is: so that it is an input, though it meets other constants first."""
-    if isinstance(number, Traced) and isinstance(constant, Sourced):
-        return Traced(float(constant), given=input_of(constant))
-    return constant
 
 
 def total(parts: Iterable[Number]) -> Number:

@@ -42,6 +42,30 @@ def is_unwritten_pipe(path: Path) -> bool:
     return path.is_fifo() and not str(path).startswith(_OPENED)
 
 
+_KINDS: Final = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFDIR: "a directory",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def require_regular(path: Path, *, or_written_pipe: bool = False) -> None:
+    """Refuse a file that may have no end or is read more than once, as a device; a pipe with a writer may be allowed.
+
+    Raises
+    ------
+    BusplanError
+        It is no such file, does not exist or cannot be looked at.
+    """
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
+    if not stat.S_ISREG(mode) and not (or_written_pipe and stat.S_ISFIFO(mode) and not is_unwritten_pipe(path)):
+        raise BusplanError(f"{path}: is {_KINDS.get(stat.S_IFMT(mode), 'no file')}; give a regular file")
+
+
 @contextmanager
 def new_file(path: Path, *, overwrite: bool) -> Iterator["NewFile"]:
     """Open a file for atomic writing: a temporary file next to it is renamed at the end.

@@ -211,3 +211,39 @@ def test_a_pipe_that_nobody_writes_is_refused(run: Run, tmp_path: Path, command:
     if command[0] == "measured":
         done = run("check", command[1], "--no-circle", "--recording", "pipe", cwd=tmp_path)
         assert (done.returncode, "pipe: is a named pipe; give a regular file" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("start", ["", "date Mon ", ";$FILEVERSION=1.1\n;"])
+def test_a_line_is_read_no_further_than_one_can_be(start: str, run: Run, tmp_path: Path) -> None:
+    with (tmp_path / "long.log").open("w") as file:
+        file.write(start or candump(LOGGED))
+        file.writelines(["x" * MANY] * 100)
+    outcome = run("measured", "can-servo-8", "long.log", cwd=tmp_path)
+    assert "a line of 4,096 bytes or more" in outcome.stdout + outcome.stderr
+    assert outcome.returncode == (2 if start else 0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="devices have other names there")
+@pytest.mark.parametrize("path", ["/dev/zero", "."])
+@pytest.mark.parametrize("profile", ["can-servo-8", "ethercat-servo-8"])
+def test_what_is_no_file_is_refused(path: str, profile: str) -> None:
+    with pytest.raises(BusplanError, match=r"is a (device|directory); give a regular file"):
+        busplan.measured(profile, path)
+
+
+def test_many_channels_and_long_names_are_shortened(tmp_path: Path) -> None:
+    log = tmp_path / "channels.log"
+    log.write_text("".join(f"(1.{number:06d}) {'c' * 500}{number} 181#00\n" for number in range(9)))
+    with pytest.raises(BusplanError, match=r"9 channels.* and 1 more") as caught:
+        busplan.measured("can-servo-8", log)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="this system does not list open files")
+def test_a_damaged_blf_is_closed(tmp_path: Path) -> None:
+    log = tmp_path / "damaged.blf"
+    log.write_bytes(b"LOGG" + b"\0" * 200)
+    with pytest.raises(BusplanError):
+        busplan.measured("can-servo-8", log)
+    numbers = [path for path in Path("/proc/self/fd").iterdir() if path.exists()]
+    assert log.resolve() not in [path.resolve() for path in numbers]

@@ -220,10 +220,15 @@ class BusCycle(ABC):
         alone = {term: min(causes) for term, causes in keys.items() if len(causes) == 1}
         return tuple(Term(key, us, alone.get(key, "")) for key, us in self.by_term.items())
 
-    @property
+    @cached_property
     def required_us(self) -> Number:
         """Time that the whole cycle needs, the sum of its terms: N times equation (2) of the paper [us]."""
         return total(self.by_term.values())
+
+    @property
+    def required_time_slice_us(self) -> Number:
+        """Time slice that each node needs [us]."""
+        return self.required_us / self.network.nodes
 
     @property
     def most_required_us(self) -> Number:

@@ -1,6 +1,7 @@
 """Frames of CAN logs as arrays, with the bits that each had on the wire."""
 
 import logging
+import os
 import re
 import zlib
 from collections import Counter
@@ -8,14 +9,15 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from pathlib import Path
 from struct import Struct
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, BinaryIO, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from busplan.english import plural
+from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
+from busplan.files import require_regular
 from busplan.progress import Progress
 from busplan.recordings.capture import SOCKETCAN, CaptureNotes, is_capture, packets
 from busplan.recordings.statistics import Floats
@@ -57,6 +59,14 @@ _PIECE: Final = 50_000  # frames whose stuff bits are counted at once
 _CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
 """Bytes of the DLC values 10 to 15, as python-can gives `dlc`, even for classical frames, which have 8 bytes."""
+_MOST_LINE_BYTES: Final = 4096
+"""Longest line of a log of text; a frame has under 300 bytes."""
+_MOST_FRAMES: Final = 2_000_000
+"""Most frames of a log that are read, an hour of a busy bus: they bound the memory."""
+_MOST_CHANNELS: Final = 256
+"""Most channels of a log."""
+_SHOWN_CHANNELS: Final = 8
+_SHOWN_NAME: Final = 40
 _DAY_S: Final = 86_400.0
 _LONGEST_S: Final = _DAY_S
 """Longest time from a frame to the next in an undamaged log [s]."""
@@ -114,13 +124,11 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
         The file cannot be read, is of no known format, has no frame, has frames of several channels and none is named,
         or none of the one that is named; or python-can is not installed.
     """
-    if path.is_fifo():
-        # A pipe may block for ever, and the file is opened twice.
-        raise BusplanError(f"{path}: is a named pipe; give a regular file")
+    require_regular(path)
     try:
         with path.open("rb") as file:
             head = file.read(4)
-        size = path.stat().st_size
+            size = os.fstat(file.fileno()).st_size
     except OSError as error:
         raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
     log = _Log(channel)
@@ -136,37 +144,54 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
     # Hide its warnings of frames that it skips: they are missing in the figures.
     logging.getLogger("can").addHandler(logging.NullHandler())
     name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
-    reader: Any = None
     try:
-        if name is None:
-            reader = can.CanutilsLogReader(cast("Any", _CandumpText(path)))
-        else:
-            reader = (_bounded_blf() if name == "BLFReader" else getattr(can, name))(str(path))
-        stream = getattr(reader, "file", None)
-        log.read(reader, lambda: progress(min(stream.tell() if stream else 0, size), size))
+        with path.open("rb") as file:
+            reader: Any
+            if name is None:
+                reader = can.CanutilsLogReader(cast("Any", _CandumpText(path, file)))
+            elif name == "BLFReader":
+                reader = _bounded_blf()(file)
+            else:
+                reader = getattr(can, name)(cast("Any", _Lines(file)))
+            log.read(reader, lambda: progress(min(file.tell(), size), size))
     except _DamageError as error:
         log.broken = str(error)
     except BusplanError:
         raise
     except Exception as error:  # noqa: BLE001 - a damaged log fails in many ways
         log.broken = f"{type(error).__name__}: {error}"
-    finally:
-        with suppress(Exception):
-            reader.stop()
     return log.frames(path)
 
 
-class _CandumpText:
-    """Lines of a text of candump as `candump -l` writes them; comments are left out."""
+class _Lines:
+    """Lines of a log, none of them longer than a log's may be; python-can reads from it as from a file of text."""
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._file = path, path.open("rb")
-        self._has_begun = False
-        self.tell, self.close = self._file.tell, self._file.close
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.read, self.close = file.read, file.close
+
+    def write(self, _: str) -> int:
+        """Nothing: python-can takes for a file what could be written."""
+        return 0
 
     def __iter__(self) -> Iterator[str]:
-        for number, content in enumerate(self._file, start=1):
-            line = content.decode("utf-8", "replace").strip()
+        while content := self._file.readline(_MOST_LINE_BYTES):
+            if len(content) == _MOST_LINE_BYTES:
+                raise _DamageError(f"a line of {_MOST_LINE_BYTES:,} bytes or more")
+            yield content.decode("utf-8", "replace")
+
+
+class _CandumpText(_Lines):
+    """Lines of a text of candump as `candump -l` writes them; comments are left out."""
+
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        super().__init__(file)
+        self._path = path
+        self._has_begun = False
+
+    def __iter__(self) -> Iterator[str]:
+        for number, content in enumerate(super().__iter__(), start=1):
+            line = content.strip()
             if line and not line.startswith("#"):
                 yield self._frame(line, number)
 
@@ -248,6 +273,8 @@ def _bounded_blf() -> Any:
                 signature, size, kind = _BLF_OBJECT.unpack(head)
                 if signature != b"LOBJ" or size < _BLF_OBJECT.size:
                     raise _DamageError("damaged data where an object of the log should begin")
+                if size > _MOST_CONTAINER_BYTES:
+                    raise _DamageError(f"an object of over {_MOST_CONTAINER_BYTES:,} bytes")
                 content = self.file.read(size - _BLF_OBJECT.size)
                 self.file.read(size % 4)
                 if kind == _BLF_CONTAINER:
@@ -295,6 +322,10 @@ class _Log:
             _require_frame(message, last_s)
             last_s = message.timestamp
             self._channels[message.channel] += 1
+            if len(self._channels) > _MOST_CHANNELS:
+                raise _DamageError(f"over {_MOST_CHANNELS} channels")
+            if len(self._rows) >= _MOST_FRAMES * _ROW.size:
+                raise _DamageError(f"it has more than {_MOST_FRAMES:,} frames; give a part of it")
             if self._channel not in (None, str(message.channel)):
                 continue
             is_fd = message.is_fd
@@ -315,12 +346,13 @@ class _Log:
             why = f" ({self.broken})" if self.broken else ""
             errors = f" but {plural(self._errors, 'error frame')}" if self._errors else ""
             if self._channel is not None and self._channels:
-                names = ", ".join(map(str, self._channels))
-                raise BusplanError(f"{path}: channel {self._channel}: no such channel; there are {names}")
+                names = first_of([*map(_shown, self._channels)], _SHOWN_CHANNELS)
+                raise BusplanError(f"{path}: channel {_shown(self._channel)}: no such channel; there are {names}")
             raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
         if len(self._channels) > 1 and self._channel is None:
-            named = ", ".join(
-                f"{channel} ({plural(count, 'frame')})" for channel, count in self._channels.most_common()
+            counts = self._channels.most_common()
+            named = first_of(
+                [f"{_shown(channel)} ({plural(count, 'frame')})" for channel, count in counts], _SHOWN_CHANNELS
             )
             raise BusplanError(
                 f"{path}: has frames of {len(self._channels)} channels: {named}; --channel NAME reads one"
@@ -344,6 +376,12 @@ class _Log:
             self.broken,
             self.synthetic or f"{SYNTHETIC} by the name of its channel" * (SYNTHETIC in self._channels),
         )
+
+
+def _shown(channel: object) -> str:
+    """Name of a channel, shortened."""
+    name = str(channel)
+    return name if len(name) <= _SHOWN_NAME else f"{name[:_SHOWN_NAME]}..."
 
 
 def _require_frame(message: Any, before_s: float | None) -> None:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from busplan.english import printable
 from busplan.errors import BusplanError
-from busplan.files import is_unwritten_pipe
+from busplan.files import require_regular
 from busplan.progress import Progress
 from busplan.recordings.written import SYNTHETIC
 
@@ -79,6 +79,12 @@ class CaptureNotes:
     """What its comment, or its frames, say of an emulation; empty where it is of a machine."""
     broken_at: int | None = None
     """Offset of the damage in the file, from which nothing is read; None for a whole file."""
+    is_long: bool = False
+    """Whether the file has more packets than are read; `broken_at` is where the next begins."""
+
+
+MOST_PACKETS: Final = 2_000_000
+"""Most packets of a capture that are read, but for the rest of a piece: they bound the memory."""
 
 
 def is_capture(head: bytes) -> bool:
@@ -105,8 +111,7 @@ def packets(path: Path, notes: CaptureNotes, *, link: int = ETHERNET, progress: 
     BusplanError
         The file cannot be read, or is no such file.
     """
-    if is_unwritten_pipe(path):
-        raise BusplanError(f"{path}: is a named pipe; give a regular file")
+    require_regular(path, or_written_pipe=True)
     try:
         with path.open("rb") as file:
             yield from _pieces(file, path, notes, link, progress)
@@ -143,6 +148,9 @@ def _pieces(
                 return
             before = int(times[-1])
         at += used
+        if notes.packets >= MOST_PACKETS:
+            notes.broken_at, notes.is_long = at, True
+            return
         is_last = len(content) - len(held) < _PIECE_BYTES
         held = content[used:]
         progress(min(at, total), total)

@@ -38,7 +38,7 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network, Rate
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, total
+from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, step, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
@@ -121,15 +121,16 @@ class EthercatCycle(BusCycle):
         return packing(self.network, self._devices)
 
     @cached_property
+    @step("D")
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(group.number * group.data_bytes for group in self._devices), "process_bytes", "D")
+        return total(group.number * group.data_bytes for group in self._devices)
 
     @cached_property
     def _overhead_bytes(self) -> Number:
         packed = self.packing
         headers = packed.datagrams_bytes - self.process_bytes
-        return packed.frames * overhead_bytes(packed.frames) + headers + packed.padding_bytes
+        return packed.frames * overhead_bytes() + headers + packed.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:
@@ -333,16 +334,17 @@ class EthercatCycle(BusCycle):
         return process_us(self.network, devices(self.network))
 
     @cached_property
+    @step("way")
     def _way_us(self) -> Number:
         """Delay of devices and cables to the last device and back [us]."""
-        return named(devices_us(self.network) + cables_us(self.network), "way_us", "way")
+        return devices_us(self.network) + cables_us(self.network)
 
+    @step("t_cmd", "command_us")
     def _taken_us(self, group: Group) -> Number:
         """Latest time at which a group has taken its command, as if at the end of the segment [us]."""
         bus = self.network.profile.bus
         on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
-        taken_us = on_wire_us + group.write_execution_us + group.worst_extra_us
-        return named(taken_us, "command_us", "t_cmd")
+        return on_wire_us + group.write_execution_us + group.worst_extra_us
 
     def _command(self, group: Group) -> dict[str, Number]:
         """Phases of a command: from the cycle with the feedback it is computed from, to its effect."""

@@ -37,8 +37,8 @@ from busplan.elementwise import (
     rounded_up,
     smaller,
     square_root,
+    step,
     total,
-    traced_with,
 )
 from busplan.errors import BusplanError
 from busplan.sourced import cached
@@ -72,7 +72,7 @@ class Packing(NamedTuple):
     @property
     def wire_bytes(self) -> Number:
         """All frames on the wire [bytes]."""
-        return self.frames * overhead_bytes(self.frames) + self.datagrams_bytes + self.padding_bytes
+        return self.frames * overhead_bytes() + self.datagrams_bytes + self.padding_bytes
 
 
 def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> Packing:
@@ -99,7 +99,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     """
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
-    headers = total([traced_with(c.DATAGRAM_BYTES, devices[0].number)] * datagrams)
+    headers = total([c.DATAGRAM_BYTES] * datagrams)
     free: Number = 0.0  # bytes for data in the open frame, which is the last so far
     frames: Number = 0
     last: Number = 0.0
@@ -470,19 +470,17 @@ def housekeeping_bytes(network: Network) -> Number:
     """Datagrams that the master adds to the first frame, that of distributed clocks included [bytes]."""
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
-        return total(datagram_bytes(traced_with(size, network.nodes)) for size in bus.housekeeping_bytes)
+        return total(datagram_bytes(size) for size in bus.housekeeping_bytes)
     tables = (
         (c.by_key("HOUSEKEEPING_BYTES"), c.by_key("CLOCK_BYTES"))
         if bus.distributed_clocks
         else (c.by_key("HOUSEKEEPING_BYTES"),)
     )
-    added = [
-        traced_with(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]
-    ]
+    added: list[Number] = [table[bus.master or UNNAMED] for table in tables if table[bus.master or UNNAMED]]
     if bus.master in c.by_key("STATE_CHECK_BYTES"):
         checks_bytes = network.nodes * c.by_key("STATE_CHECK_BYTES")[bus.master]
         # State checks of many devices fill frames of their own: their overhead counts here.
-        added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes(network.nodes)]
+        added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes()]
     return total(added)
 
 
@@ -502,9 +500,10 @@ def frames(network: Network, present: Sequence[Devices]) -> tuple[FrameRun, ...]
     return tuple(frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes))
 
 
+@step("sending", "sending_us")
 def process_us(network: Network, present: Sequence[Devices]) -> Number:
     """Time of the frames of process data of some devices on the wire [us]."""
-    return named(sending_us(packing(network, present).wire_bytes), "sending_us", "sending")
+    return sending_us(packing(network, present).wire_bytes)
 
 
 def mailbox_frame_us(network: Network) -> Number:
@@ -515,9 +514,7 @@ def mailbox_frame_us(network: Network) -> Number:
 def hop_us(group: Group) -> Number:
     """Delay of a device of a group, there and back: twice its `delay_us` [us]."""
     node = group.node
-    return device_us(
-        traced_with(c.by_key("DELAY_US")[node.port], group.nodes) if node.delay_us is None else node.delay_us
-    )
+    return device_us(c.by_key("DELAY_US")[node.port] if node.delay_us is None else node.delay_us)
 
 
 def devices_us(network: Network) -> Number:

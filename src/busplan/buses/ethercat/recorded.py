@@ -30,6 +30,7 @@ from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
+from busplan.recordings.capture import MOST_PACKETS
 from busplan.recordings.ethercat import COMMANDS, Datagram, EthercatFrames, read_ethercat
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, Quantile, expanded, lateness, line, quantile, step
 
@@ -402,7 +403,8 @@ class _Seen:
         """Sentences on what else the recording has, and what it does not show."""
         frames, notes = self.frames, self.frames.notes
         if notes.broken_at is not None:
-            yield f"The file is cut or damaged from byte {notes.broken_at:,} on: read up to there."
+            why = f"has more than {MOST_PACKETS:,} packets, and goes on" if notes.is_long else "is cut or damaged"
+            yield f"The file {why} from byte {notes.broken_at:,} on: read up to there."
         if self.steps_back:
             yield (f"Its clock was set back {plural(self.steps_back, 'time')}: the longest stretch between is taken.")
         if self.cycles is not None and self.cycles.left_out:

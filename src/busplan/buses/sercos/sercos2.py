@@ -9,7 +9,7 @@ from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind, Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos.shared import DELAYS, SercosCycle, delays, word_bytes
-from busplan.elementwise import Number, choose, named, rounded_down, total
+from busplan.elementwise import Number, choose, rounded_down, step, total
 from busplan.sourced import Constants
 
 DataRate = Literal[2, 4, 8, 16]
@@ -161,12 +161,10 @@ class Sercos2Cycle(SercosCycle):
         return telegram_us(data_bytes, data_rate_mbit_s=rate, is_stuffed=self.is_stuffed)
 
     @cached_property
+    @step("s_MDT")
     def mdt_bytes(self) -> Number:
         """Data of the MDT, a record for each drive [bytes]."""
-        data_bytes = total(
-            (word_bytes(group.write_bytes) + c.RECORD_BYTES) * group.nodes for group in self.network.groups
-        )
-        return named(data_bytes, "mdt_bytes", "s_MDT")
+        return total((word_bytes(group.write_bytes) + c.RECORD_BYTES) * group.nodes for group in self.network.groups)
 
     @cached_property
     def start_us(self) -> Number:

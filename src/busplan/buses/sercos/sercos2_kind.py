@@ -5,8 +5,8 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import (
     NODE_LIMIT,
+    ExactLimit,
     Key,
-    Limit,
     PayloadRange,
     Perturbation,
     TimingModel,
@@ -32,7 +32,7 @@ LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
     nodes_limit("drives", lambda: c.MOST_DRIVES, "ring"),
-    Limit(
+    ExactLimit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
         lambda network: Sercos2Cycle(network, NONE).mdt_bytes,

@@ -23,7 +23,7 @@ from busplan.buses.sercos.sercos3 import (
     telegrams_us,
 )
 from busplan.buses.sercos.shared import SercosCycle, delays
-from busplan.elementwise import Number, choose, larger, named, smaller, total
+from busplan.elementwise import Number, choose, larger, smaller, total
 from busplan.sections.base import TransactionKind
 
 TimingModelName = Literal["window", "telegrams"]
@@ -87,7 +87,7 @@ class Sercos3Cycle(SercosCycle):
     def jitter_us(self) -> Number:
         """Jitter of the synchronisation [us]."""
         bus = self.network.profile.bus
-        return named(sync_jitter_us(bus.master_jitter_us, gap_bytes=bus.gap_bytes), "sync_jitter_us", "J")
+        return sync_jitter_us(bus.master_jitter_us, gap_bytes=bus.gap_bytes)
 
     @cached_property
     def ring_us(self) -> Number:
@@ -96,13 +96,12 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window:
             return 0.0
         delay_us: Number = bus.device_delay_us
-        around_us = ring_delay_us(
+        return ring_delay_us(
             self.network.nodes,
             device_delay_us=delay_us,
             gap_bytes=bus.gap_bytes,
             component_delay_us=bus.component_delay_us,
         )
-        return named(around_us, "ring_delay_us", "t_ring")
 
     @property
     def _jitters(self) -> tuple[int, int]:

@@ -7,8 +7,8 @@ from typing import ClassVar, Final
 from busplan.buses.limits import (
     NODE_LIMIT,
     Cost,
+    ExactLimit,
     Key,
-    Limit,
     PayloadRange,
     Perturbation,
     Setting,
@@ -45,14 +45,14 @@ LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
     nodes_limit("devices", lambda: c.MOST_DEVICES, "network"),
-    Limit(
+    ExactLimit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
         _largest_telegram,
         lambda _network: c.MOST_BYTES,
         way_out="a smaller payload would do",
     ),
-    Limit(
+    ExactLimit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
         _most_telegrams,

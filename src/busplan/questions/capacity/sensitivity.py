@@ -340,7 +340,7 @@ def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
     """Say how much nearer a change comes to each limit that is a time; the distance is from its value plus U."""
     for limit in network.bus.limits:
-        if limit.doubt is None:
+        if not limit.has_doubt:
             continue
         left_us, then_us = (limit.most(of) - limit.shown.value(of) for of in (network, changed))
         if then_us < left_us and left_us > 0:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Held, Limit
 from busplan.buses.network import Network
-from busplan.buses.time_slice import required_time_slice_us, time_slice_us
+from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,
@@ -43,7 +43,7 @@ class MostNodes(NamedTuple):
 
     nodes: Number
     limit: Number
-    limits: Sequence[Limit]
+    limits: Sequence[Held]
     """The limits that were tried."""
 
     @property
@@ -105,7 +105,7 @@ def most_and_safe_nodes(
 
 
 def most_nodes(
-    with_nodes: Callable[[Number], Network], limits: Sequence[Limit], *, ceiling: int = MAX_COUNT
+    with_nodes: Callable[[Number], Network], limits: Sequence[Held], *, ceiling: int = MAX_COUNT
 ) -> MostNodes:
     """Find the largest number of nodes that keeps every limit; of several limits that set it, the first is named.
 
@@ -142,7 +142,7 @@ _HALVED_EVERY: Final = 3
 """One step of a search in so many halves the range, whatever the values say."""
 
 
-def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
+def _most_within(limit: Held, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
     """The largest number of nodes that keeps one limit; every larger number breaks it.
 
     A value grows almost as the nodes do: the next number tried lies on the line between the last two.
@@ -461,7 +461,7 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "available_us": given_us,
         "required_us": required_us,
         "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),
-        "required_time_slice_us": required_time_slice_us(required_us, nodes=nodes),
+        "required_time_slice_us": cycle.required_time_slice_us,
         "utilisation": required_us / given_us,
         "margin_us": margin_us(required_us, available_us=given_us),
         "min_period_us": shortest_period_us(network, required_us),
@@ -492,7 +492,7 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     bus = network.bus
     period_us = bus.periods.shortest_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
-        if limit.period is not None and not limit.is_slow:
+        if limit.has_period and not limit.is_slow:
             kept = limit.shown if is_shown else limit.nominal
             period_us = larger(period_us, bus.periods.shortest_us(kept.shortest_period_us(network)))
     return period_us

@@ -95,7 +95,7 @@ def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
             continue
         # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
         at_us = max(time.slice_us, least_us, MIN_STEP_US)
-        at = network if limit.period is None else network._replace(period_us=at_us)
+        at = network._replace(period_us=at_us) if limit.has_period else network
         if limit.shown.is_broken(at):
             kept_us = limit.shown.shortest_period_us(at)
             if kept_us == inf:
@@ -168,7 +168,7 @@ def unmet(network: Network) -> list[Need]:
     needs = list(_unmet([*to_be_shown(network), *_of_limits(network)], network))
     if not broken and not needs:
         # What a limit needs of the slice was computed at the shortest period.
-        broken = [limit for limit in limits if limit.period is not None and limit.shown.is_broken(network)]
+        broken = [limit for limit in limits if limit.has_period and limit.shown.is_broken(network)]
         needs = [Need(inf, missed.key, missed.words) for missed in missed_limits(network)]
     return [*(Need(inf, limit.key, limit.words(network)) for limit in broken), *needs]
 
@@ -214,7 +214,7 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
     def missing(period_us: float) -> Need | None:
         at = at_period(network, period_us)
         need = most(at)
-        broken = any(limit.period is not None and limit.shown.is_broken(at) for limit in bus.limits)
+        broken = any(limit.has_period and limit.shown.is_broken(at) for limit in bus.limits)
         is_missed = broken or not within(need.period_us(ratio), period_us) or (with_limits and missed_limits(at))
         return need if is_missed else None
 
