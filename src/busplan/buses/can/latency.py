@@ -6,7 +6,7 @@ from typing import Final
 
 from busplan.buses.can.equations import bit_us
 from busplan.buses.can.streams import Points, Stream, repeated, repeated_by_place, streams
-from busplan.buses.can.traffic import NO_DEADLINE_US, SYNC, Traffic
+from busplan.buses.can.traffic import NO_DEADLINE_US, SYNC, Traffic, kept
 from busplan.buses.can.waiting import Start, arriving, beside_sync, offered, responses, starts
 from busplan.elementwise import Number, Traced, choose, is_off, named, total, value_of
 from busplan.english import first_of
@@ -96,12 +96,14 @@ def numbered(parts_us: Mapping[str, Number], source: str = "", **figures: Number
     return {**figures, **parts_us, "worst_response_us": response_us, "deadline_us": deadline_us}
 
 
+@kept
 def _last_in_queue(traffic: Traffic, place: int) -> Stream | None:
     """Stream of the lowest priority in the queue of a response; None where the queue is by priority."""
     answered, _ = responses(traffic)[place]
     return next((stream for stream in streams(traffic) if stream.last_place == answered.queue_place), None)
 
 
+@kept
 def _counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """Frames in a response, in words: the one that blocks, and those that go before, by number."""
     answered, worst = responses(traffic)[place]

@@ -9,6 +9,7 @@ from busplan.buses.can.equations import BASE_BITS, c, frame_us, share_bytes
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, choose, is_off, larger, pointwise, total
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
+from busplan.sourced import constants_looked_up
 
 FOLLOWS: Final = -1
 """Identifier of a PDO that follows the last one of the group before."""
@@ -111,7 +112,9 @@ def kept(
     def of_traffic(traffic: "Traffic", *given: _Given.args, **named: _Given.kwargs) -> _Result:
         key: Hashable = (function, given, *named.items())
         if key not in traffic.results:
-            traffic.results[key] = function(traffic, *given, **named)
+            # A search is of plain numbers, and no step of a derivation.
+            with constants_looked_up(None):
+                traffic.results[key] = function(traffic, *given, **named)
         result: _Result = traffic.results[key]
         return result
 
