@@ -121,7 +121,8 @@ _LOOKED_UP: Final[ContextVar[Callable[["Sourced"], Any] | None]] = ContextVar("c
 @contextmanager
 def constants_looked_up(form: Callable[[Sourced], Any] | None) -> Iterator[None]:
     """Give constants in another form where they are looked up, as traced numbers; None for plain constants."""
-    _look_up_each_time()
+    if form:
+        _look_up_each_time()
     token = _LOOKED_UP.set(form)
     try:
         yield

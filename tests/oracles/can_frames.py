@@ -124,3 +124,34 @@ def fd_written_bits(
     )
     both = len(nominal) + FD_NEVER_STUFFED, len(fast) + 1
     return both if is_switched else (sum(both), 0)
+
+
+STUFF_STEP = 4
+"""Bits from one stuff bit to the next where they come closest: a stuff bit counts among the next five alike."""
+
+
+def most_bits(size: int, *, identifier_bits: int) -> int:
+    """Most bits of any frame with so much data, interframe space included."""
+    open_to_stuffing = len(before_stuffing(0, bytes(size), identifier_bits=identifier_bits))
+    stuff_bits = len(range(5, open_to_stuffing + 1, STUFF_STEP))
+    return open_to_stuffing + stuff_bits + NEVER_STUFFED
+
+
+def fd_most_bits(size: int, *, identifier_bits: int) -> tuple[int, int]:
+    """Most bits at each rate of any FD frame with so much data, each part by itself; interframe space included."""
+    padded = next(length for length in DLC_LENGTHS if length >= size)
+    header = len(fd_header(0, identifier_bits=identifier_bits))
+    body = len(fd_body(bytes(padded), is_passive=False))
+    # The stuff bit behind the last bit of the header has the rate of the body, and none comes behind the body's last.
+    stuff_bits = len(range(5, header, STUFF_STEP)), len(range(0, body, STUFF_STEP))
+    tail = 4 + (CRC_21 if padded > 16 else CRC_17)[0]
+    fixed = len(range(0, tail, STUFF_STEP))
+    return header + stuff_bits[0] + FD_NEVER_STUFFED, body + stuff_bits[1] + tail + fixed + 1
+
+
+def most_us(size: int, *, identifier_bits: int = 11, bit_rate: float, data_bit_rate: float = 0) -> float:
+    """Longest time of a frame at bit rates in kbit/s, of CAN FD with a data bit rate [us]."""
+    if not data_bit_rate:
+        return most_bits(size, identifier_bits=identifier_bits) * 1000 / bit_rate
+    nominal, fast = fd_most_bits(size, identifier_bits=identifier_bits)
+    return nominal * 1000 / bit_rate + fast * 1000 / data_bit_rate

@@ -181,6 +181,21 @@ def test_slow_oscillators_are_a_doubt_of_cycle_load_and_responses(name: str) -> 
     assert slow_us == pytest.approx(late_us + 0.01 * (frames_us + late_us))
 
 
+@pytest.mark.parametrize("name", ["can-servo-8", "can-fd-arm-7", "can-motors-8"])
+def test_a_response_with_slow_oscillators_is_explained(name: str) -> None:
+    slow = busplan.load_profile(name, changes={"bus.clock_tolerance": 0.01})
+    derivations = busplan.explain(slow, "worst_response_us").to_dict()["derivations"]
+    assert all("bus.clock_tolerance" in [given["name"] for given in each["inputs"]] for each in derivations)
+
+
+@pytest.mark.parametrize("name", ["can-servo-8", "can-fd-arm-7", "can-motors-8"])
+def test_a_response_with_repeated_frames_is_explained(name: str) -> None:
+    disturbed = busplan.load_profile(name, changes={"bus.error_period_us": 1e5})
+    derivations = busplan.explain(disturbed, "worst_response_us").to_dict()["derivations"]
+    assert all("bus.error_period_us" in [given["name"] for given in each["inputs"]] for each in derivations)
+    assert any("1 repeated frames of" in str(each) for each in derivations)
+
+
 def test_a_load_kept_by_exact_clocks_alone_is_not_shown() -> None:
     load = figures(busplan.load_profile("can-servo-8")).own["bus_load"]
     for share, verdict in ((0.0, "fits"), (0.005, "fits"), (0.0158, "not shown to fit")):

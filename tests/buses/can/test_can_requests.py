@@ -14,8 +14,8 @@ import pytest
 
 import busplan
 from busplan import BusplanError
-from busplan.buses.can.equations import frame_us
 from tests.buses.can.machines import figures, loaded, responses, terms
+from tests.oracles.can_frames import most_us
 from tests.oracles.request_simulation import Frame, Motor, Sent, simulate
 
 CYCLES: Final = 4
@@ -48,8 +48,7 @@ class Arm(NamedTuple):
 
     def us(self, size: int, *, is_fd: bool = False) -> int:
         rate = self.data_rate if is_fd else 0
-        us = frame_us(size, identifier_bits=11, bit_rate_kbit_s=1000, data_bit_rate_kbit_s=rate, is_stuffed=True)
-        return round(float(us) * 10)
+        return round(most_us(size, bit_rate=1000, data_bit_rate=rate) * 10)
 
     def frames(self, first: int, motor: int, size: int) -> tuple[Frame, ...]:
         """Frames of a command or an answer, in tenths of a microsecond."""

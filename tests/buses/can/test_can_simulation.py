@@ -1,7 +1,8 @@
 """The waits of a cycle against a simulation of the bus, whose messages come when they hurt most.
 
-The simulation, tests/oracles/can_simulation.py, sends frame by frame and knows nothing of the model. Networks are
-drawn, and an adversary climbs from random moments of messages, nodes and host to worse ones. For many more networks:
+The simulation, tests/oracles/can_simulation.py, sends frame by frame and knows nothing of the model; frames are as long
+as tests/oracles/can_frames.py says. Networks are drawn, and an adversary climbs from random moments of messages, nodes
+and host to worse ones. For many more networks:
 
     python -m tests.buses.can.test_can_simulation 0 5000
 
@@ -18,8 +19,8 @@ from typing import Final, NamedTuple
 import pytest
 
 import busplan
-from busplan.buses.can.equations import frame_us
 from tests.buses.can.machines import loaded, responses
+from tests.oracles.can_frames import most_us
 from tests.oracles.can_simulation import Frame, Run, SimulatedMessage, SimulatedNode, simulate
 
 CYCLES: Final = 4
@@ -99,13 +100,7 @@ class Traffic(NamedTuple):
         extended = f"{identifier >> 18:011b}11{identifier & 0x3FFFF:018b}0"  # 11 bits, SRR 1, IDE 1, 18 bits, RTR 0
         word = base if bits == 11 else extended
         rate = self.data_bit_rate if data_bit_rate is None else data_bit_rate
-        us = frame_us(
-            size,
-            identifier_bits=bits,
-            bit_rate_kbit_s=self.bit_rate,
-            data_bit_rate_kbit_s=rate,
-            is_stuffed=True,
-        )
+        us = most_us(size, identifier_bits=bits, bit_rate=self.bit_rate, data_bit_rate=rate)
         # Nodes far apart make delimiter and acknowledge of an FD frame two bits long each.
         us += 2 * 1000 / self.bit_rate if rate else 0
         return Frame(int(word.ljust(32, "0"), 2), int(us))

@@ -15,8 +15,10 @@ from tests.oracles.can_frames import (
     NEVER_STUFFED,
     before_stuffing,
     crc_fd,
+    fd_most_bits,
     fd_written,
     fd_written_bits,
+    most_bits,
     stuffed,
     written_bits,
 )
@@ -37,6 +39,15 @@ def test_lengths_are_the_published_ones() -> None:
             # Davis et al. 2007: 55 + 10 s and 80 + 10 s; 47 + 8 s and 67 + 8 s without stuff bits.
             assert frame_bits(size, identifier_bits=identifier_bits, is_stuffed=True) == worst + 10 * size
             assert frame_bits(size, identifier_bits=identifier_bits, is_stuffed=False) == plain + 8 * size
+            assert most_bits(size, identifier_bits=identifier_bits) == worst + 10 * size
+
+
+@pytest.mark.parametrize("identifier_bits", [11, 29])
+def test_the_most_bits_of_an_fd_frame_are_those_that_its_fields_can_have(identifier_bits: int) -> None:
+    for size in range(65):
+        assert fd_frame_bits(size, identifier_bits=identifier_bits, is_stuffed=True) == fd_most_bits(
+            size, identifier_bits=identifier_bits
+        )
 
 
 @pytest.mark.parametrize(("rate", "us"), [(1000, 135), (500, 270), (250, 540), (125, 1080)])

@@ -29,29 +29,26 @@ cpdef (double, double, double) worst_instance(
 
 
 @cython.locals(
-    senders=Py_ssize_t, point=Py_ssize_t, ends=double[::1], frames=double[::1], blocking=double[::1], sent=double[::1],
-    once=double[::1], periods=double[::1], jitters=double[::1], rank=Py_ssize_t, load=double, first_us=double,
-    number=Py_ssize_t, sender=Py_ssize_t, index=Py_ssize_t, ahead_us=double, worst=double, wait=double, response=double,
+    group=Py_ssize_t[::1], place=double[::1], last=double[:, ::1], frame_us=double[:, ::1],
+    blocks_us=double[:, ::1], sent_us=double[:, ::1], enough_us=double[:, ::1], period_us=double[:, ::1],
+    bit_us=double[::1], once_us=double[:, ::1], jitter_us=double[:, ::1], blocking_us=double[:, ::1],
+    instance=double[:, ::1], wait_us=double[:, ::1], response_us=double[:, ::1], longest_us=double[::1],
+    before_us=double[::1], count=Py_ssize_t, groups=Py_ssize_t, point=Py_ssize_t, ends=double[::1], frames=double[::1],
+    blocks=double[::1], sent=double[::1], once=double[::1], periods=double[::1], jitters=double[::1], rank=Py_ssize_t,
+    load=double, first_us=double, number=Py_ssize_t, sender=Py_ssize_t, index=Py_ssize_t, ahead_us=double, worst=double,
+    wait=double, response=double,
 )
-cpdef object responses(
-    Py_ssize_t[::1] answered, Py_ssize_t[::1] group, double[::1] place, double[:, ::1] last, double[:, ::1] frame_us,
-    double[:, ::1] blocking_us, double[:, ::1] sent_us, double[:, ::1] enough_us, double[:, ::1] period_us,
-    double[:, ::1] bit_us, double[:, ::1] once_us, double[:, ::1] jitter_us, double[::1] longest_us,
-    double[::1] before_us, double[:, ::1] blocked_us, double[:, ::1] instance, double[:, ::1] wait_us,
-    double[:, ::1] response_us,
-)
+cdef object _respond(Py_ssize_t[::1] answered, object senders, object start, object found)
 
 
 @cython.locals(
-    point=Py_ssize_t, message=Py_ssize_t, before=double[::1], lower=double[::1], periods=double[::1],
-    jitters=double[::1], numbers=double[::1], bursts=double[::1], deadlines=double[::1], ahead_us=double, bit=double,
-    span=double, load=double, blocked=double, longer=double,
+    before_us=double[:, ::1], lower_us=double[:, ::1], identifiers=double[:, ::1], burst=double[:, ::1],
+    period_us=double[:, ::1], jitter_us=double[:, ::1], deadline_us=double[:, ::1], lasts_us=double[::1],
+    blocked_us=double[::1], point=Py_ssize_t, message=Py_ssize_t, before=double[::1], lower=double[::1],
+    periods=double[::1], jitters=double[::1], numbers=double[::1], bursts=double[::1], deadlines=double[::1],
+    ahead_us=double, bit=double, span=double, load=double, blocked=double, longer=double,
 )
-cpdef object cycle_waits(
-    Py_ssize_t most, double[:, ::1] others_us, double[:, ::1] bit_us, double[:, ::1] before_us, double[:, ::1] lower_us,
-    double[:, ::1] identifiers, double[:, ::1] burst, double[:, ::1] period_us, double[:, ::1] jitter_us,
-    double[:, ::1] deadline_us, double[:, ::1] lasts_us, double[:, ::1] blocked_us,
-)
+cpdef object cycle_waits(Py_ssize_t most, double[::1] others_us, double[::1] bit_us, object messages)
 
 
 @cython.locals(

@@ -1,4 +1,4 @@
-"""The log of a planned CAN machine: its frames by their arbitration, with the stuff bits of random data."""
+"""Log of a planned CAN machine: its frames by their arbitration, with the stuff bits of random data."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -8,7 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c
-from busplan.buses.can.frames import SYNC, Stream, place, streams, traffic_of
+from busplan.buses.can.streams import Stream, place, streams
+from busplan.buses.can.traffic import SYNC, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
@@ -18,9 +19,9 @@ from busplan.recordings.written import candump
 _ERROR: Final = "20000088#0000000000000000"
 """An error frame as candump writes it."""
 _COUNTED: Final = 240
-"""SYNC's counter runs from 1 to it (CiA 301)."""
+"""Last number of SYNC's counter, which runs from 1 (CiA 301)."""
 _PAYLOADS: Final = 16
-"""Different data that a sender has."""
+"""Payloads of a sender that differ."""
 
 MISSING: Final = Fault("missing-cycle", "the host sends no SYNC", "cycles without SYNC")
 SILENT: Final = Fault("missing-pdo", "a node sends no feedback", "PDOs missing")
@@ -32,17 +33,18 @@ FAULTS: Final = (MISSING, SILENT, TWICE, LATE, JITTER, ERRORS)
 
 
 class _Sender(NamedTuple):
-    """The frames of an identifier."""
+    """Frames of an identifier."""
 
     stream: Stream
+    """Stream of the identifier."""
     order: int
-    """Its place in the arbitration."""
+    """Place in the arbitration."""
     frames: list[tuple[str, float]]
     """Frames as candump writes them, each with its time on the wire [us]."""
 
 
 _Queued = tuple[float, int, _Sender, int]
-"""When a frame is queued [us], a running number, its sender, and its cycle, or its place among those of a message."""
+"""Time at which a frame is queued [us], a running number, its sender, and its cycle, or its place in its message."""
 
 
 def emulated(network: Network, emulation: Emulation) -> bytes:
@@ -52,23 +54,13 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     behind the last feedback and half to all of its time. SYNC comes evenly within its jitter. Messages come each by its
     period and evenly within its jitter, a burst at once. Data are random. Stamps count from 0.
 
-    Parameters
-    ----------
-    network
-        The plan, of plain numbers.
-    emulation
-        Length, faults and random numbers.
-
-    Raises
-    ------
-    BusplanError
-        A fault of a cycle in a network of messages alone, or too many frames.
+    Too many frames, and a fault of a cycle in a network of messages alone, raise a BusplanError.
     """
     return candump(_Machine(network, emulation).sent())
 
 
 class _Machine:
-    """Host and nodes, and when they queue what."""
+    """Host and nodes with the frames that they queue."""
 
     def __init__(self, network: Network, emulation: Emulation) -> None:
         self.network, self.emulation, self.random = network, emulation, emulation.random
@@ -87,12 +79,12 @@ class _Machine:
         among = {SILENT: due["feedback"], TWICE: due["feedback"], LATE: due["command"]}
         self.hit = {fault: emulation.drawn(fault, among.get(fault, cycles)) for fault in FAULTS}
         self.left: dict[int, int] = {}
-        """Feedback that has not arrived, by cycle."""
+        """Feedback frames that have not arrived, by cycle."""
         self.queued = 0
-        """Number of frames that were queued so far."""
+        """Frames queued so far."""
 
     def _senders(self, stream: Stream, unstuffed: Stream) -> Iterator[_Sender]:
-        """Each identifier of a stream, with frames of random data; also given without stuff bits."""
+        """Senders of a stream, which is also given without stuff bits: one an identifier, with random data."""
         bus, is_extended = self.network.profile.bus, stream.identifier_bits > BASE_BITS
         message = next((part for part in self.network.profile.message if part.name == stream.name), None)
         is_fd = message.fd if message else bus.data_bit_rate_kbit_s is not None
@@ -144,7 +136,7 @@ class _Machine:
                     due_us += stream.period_us * stream.burst
 
     def _answers(self, sender: _Sender, cycle: int, now_us: float) -> Iterator[_Queued]:
-        """What nodes queue when SYNC has arrived, and the host when the last feedback has."""
+        """Frames that nodes queue when SYNC has arrived, and the host when the last feedback has."""
         if sender.stream.name == SYNC:
             feedback = self._due("feedback", cycle)
             # The first node is silent, or sends twice.
@@ -164,7 +156,7 @@ class _Machine:
             yield from (self._at(now_us + late_us, command, cycle) for command in self._due("command", cycle))
 
     def sent(self) -> Iterator[tuple[int, str]]:
-        """Stamps [us], at the ends of frames, and frames: of those that wait the one of the first priority goes."""
+        """Stamp of each frame at its end [us], and the frame: of those that wait the one of the first priority goes."""
         coming, waiting = list(self._alone()), list[tuple[int, int, _Sender, int]]()
         heapify(coming)
         errors = sorted(self.hit[ERRORS])

@@ -19,20 +19,20 @@ MOST_DATA_BIT_RATE: Final = DATA_BIT_RATES[-1]
 IdentifierBits = Literal[11, 29]
 
 c: Final = Constants("busplan.buses.can")
-"""Every constant with a source, by its name here."""
+"""Sourced constants of CAN, by name."""
 
 BASE_BITS: Final = 11
 """Identifier bits of the base format, CAN 2.0A; the extended format, 2.0B, has 29."""
 MAX_IDENTIFIER: Final[Mapping[int, int]] = MappingProxyType({11: (1 << 11) - 1, 29: (1 << 29) - 1})
 FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-"""Lengths that the DLC of an FD frame can say; other data is padded to the next [bytes]."""
+"""Lengths of data that the DLC of an FD frame can say; other data is padded to the next [bytes]."""
 
 
 SATURATED: Final = c.unchanged["SATURATED"]
 MOST_STEPS: Final = c.unchanged["MOST_STEPS"]
 
 KBIT_US = 1000
-"""Microseconds of a bit at 1 kbit/s."""
+"""Time of a bit at 1 kbit/s [us]."""
 
 
 def frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool) -> Number:
@@ -115,11 +115,6 @@ def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bo
 def bit_us(bit_rate_kbit_s: Number) -> Number:
     """Time of a bit [us].
 
-    Parameters
-    ----------
-    bit_rate_kbit_s
-        Bit rate [kbit/s]; float or array.
-
     Examples
     --------
     >>> bit_us(250)
@@ -137,18 +132,9 @@ def frame_us(
     late_bits: Number = 0.0,
     is_stuffed: bool,
 ) -> Number:
-    """Time of a data frame on the wire [us].
+    """Time of a data frame on the wire: classical, or of CAN FD with a data bit rate [us].
 
-    Parameters
-    ----------
-    data_bytes, identifier_bits, is_stuffed
-        As `frame_bits` takes them.
-    bit_rate_kbit_s
-        Bit rate [kbit/s]; float or array.
-    data_bit_rate_kbit_s
-        Data bit rate of a CAN FD frame; 0 for a classical frame [kbit/s]; float or array.
-    late_bits
-        Nominal bits by which nodes far apart make a CAN FD frame longer, 0..`FD_LATE_BITS` [bits].
+    Nodes far apart make a CAN FD frame longer by some late nominal bits, 0..`FD_LATE_BITS`.
 
     Examples
     --------
@@ -177,14 +163,8 @@ def payload_us(
 ) -> Number:
     """Time of all frames of a payload: each is filled before the next, and the last has the rest [us].
 
-    Parameters
-    ----------
-    payload_bytes
-        Payload, 1 or more [bytes]; float or array.
-    frame_bytes
-        Most data of each frame in their order, without it of classical frames; further ones are as the last [bytes].
-    identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, late_bits, is_stuffed
-        As `frame_us` takes them.
+    `frame_bytes` is the most data of each frame in their order, by default of classical ones; further ones are as the
+    last.
 
     Examples
     --------
@@ -219,13 +199,6 @@ def payload_us(
 
 def share_bytes(payload_bytes: Number, *, pdos: Number) -> Number:
     """Payload of each of a node's PDOs in one direction, shared out evenly [bytes].
-
-    Parameters
-    ----------
-    payload_bytes
-        Payload of the node [bytes]; float or array.
-    pdos
-        PDOs of the node [1]; float or array.
 
     Examples
     --------

@@ -6,11 +6,12 @@ from typing import Final, Literal
 
 from busplan.buses.can import equations
 from busplan.buses.can.equations import c
-from busplan.buses.can.frames import Message, Traffic, streams
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import Message, Traffic
 from busplan.buses.can.waiting import message_responses
 
 Stuffing = Literal["worst", "expected", "none"]
-"""Number of stuff bits: the most, as many as measured frames have, or none."""
+"""Stuff bits of a frame: the most, as many as measured frames have, or none."""
 
 
 def stuffed(_cycle: object, *, least: float, most: float, stuffing: Stuffing) -> float:

@@ -1,10 +1,10 @@
-"""CAN, as a kind of bus."""
+"""CAN as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
+from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle, can_cycle
 from busplan.buses.can.equations import (
     BASE_BITS,
     BIT_RATES,
@@ -13,8 +13,9 @@ from busplan.buses.can.equations import (
     MAX_IDENTIFIER,
     c,
 )
-from busplan.buses.can.frames import streams, traffic_of
 from busplan.buses.can.rules import LIMITS, RULES
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import traffic_of
 from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
@@ -148,10 +149,10 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
 
     def cycle(self, network: Network, *, model: str) -> CanCycle:
         """The cycle of a network under a timing model."""
-        return CanCycle(network, model)
+        return can_cycle(network, model)
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose response time it is."""
+        """Whose response time it is, in words."""
         if not network.groups:
             return ", ".join(("worst case of every message", *self.setup_words(network)))
         nodes = "all nodes" if network.is_uniform else "each group"

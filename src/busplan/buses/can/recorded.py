@@ -5,14 +5,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, isfinite
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
-from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.cycle import WORST, can_cycle
+from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
-from busplan.buses.can.frames import SYNC, Stream, streams
+from busplan.buses.can.streams import Stream, streams
+from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
 from busplan.english import first_of, plural
@@ -38,35 +39,16 @@ _NOT_SHOWN: Final = (
     "Not shown by a log: the bit rate, frames that the recorder did not take, when a frame was queued, commands that "
     "are always late by whole periods, and the nodes' own time."
 )
-_MADE_UP: Final = 10
-"""Due cycles within which a PDO that is missing may still come."""
-_BLOCK: Final = 50
-"""Due cycles over which PDOs of every n-th SYNC keep their place among the SYNCs."""
 _ROUNDING_US: Final = 1.0
 _CLASSICAL: Final = "classical CAN"
 _TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 
 
 def recorded(network: Network, path: Path, *, share: float, channel: str | None, progress: Progress) -> Recorded:
-    """Compare a CAN log with the plan.
+    """Compare a CAN log with the plan, a network of plain numbers.
 
-    Parameters
-    ----------
-    network
-        The plan, of plain numbers.
-    path
-        A log of `candump -l`, ASC, BLF or TRC, or a capture of SocketCAN.
-    share
-        Share of the frames that jitter is to hold for, 0.5..1.
-    channel
-        Of several channels, the name of the one that is compared.
-    progress
-        Called with the bytes read and the size of the file [bytes].
-
-    Raises
-    ------
-    BusplanError
-        No log of a single channel with frames, or one of two clocks.
+    The log is of `candump -l`, ASC, BLF or TRC, or a capture of SocketCAN; of several channels `channel` names one.
+    Jitter is to hold for a share of the frames, 0.5..1. A log without frames, or of two clocks, raises a BusplanError.
     """
     frames = read_can(path, channel=channel, progress=progress)
     try:
@@ -78,92 +60,12 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     return compared.unless_synthetic(frames.synthetic)
 
 
-class DuePdos(NamedTuple):
-    """PDOs of an identifier beside the SYNCs that they were due at."""
-
-    cycles: npt.NDArray[np.int64]
-    """Number of the SYNC that each PDO was due at."""
-    late_us: Floats
-    """Each PDO after it [us]."""
-    due: int
-    """PDOs that were due."""
-    missing: int
-    twice: int
-
-
-def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDArray[np.bool_] | None = None) -> DuePdos:
-    """Tell which SYNC each PDO was due at.
-
-    A PDO comes once for each SYNC that it is due at. Two after one SYNC, where one before had none, are late: they came
-    in their order. One that never comes is missing. A lag of whole periods that never changes cannot be seen.
-
-    Parameters
-    ----------
-    sync_us
-        Ascending times of SYNC, one a period, n of them [us].
-    times_us
-        Ascending times of the PDO, m of them, each after some SYNC [us].
-    every
-        It is due at every n-th SYNC.
-    is_sent
-        Whether each SYNC was sent; PDOs may come for those that were not, and need not. By default all were.
-
-    Examples
-    --------
-    The second of five is late, so that it comes with the third; the fifth SYNC is the last, and nobody knows of it:
-
-    >>> due_pdos(np.arange(5) * 100.0, np.array([30.0, 210, 230, 330]), every=1)[1:]
-    (array([ 30., 110.,  30.,  30.]), 4, 0, 0)
-    """
-    sent = np.ones(len(sync_us), dtype=np.bool_) if is_sent is None else is_sent
-    due = _due_at(sync_us, times_us, every, sent)
-    cycles = np.searchsorted(sync_us[due], times_us, side="right") - 1
-    times_us, cycles = times_us[cycles >= 0], cycles[cycles >= 0]
-    # After the last SYNC the log may end.
-    whole = len(due) - 1
-    counts = np.bincount(cycles, minlength=len(due))[:whole]
-    first = np.searchsorted(cycles, np.arange(len(due) + 1))
-    missing: list[int] = []
-    twice = 0
-    for place in np.flatnonzero(counts != 1).tolist():
-        if not counts[place]:
-            missing += [place] if sent[due[place]] else []
-            continue
-        for number in range(int(counts[place]) - 1):
-            if not missing or place - missing[-1] > _MADE_UP:
-                # The log may begin with a PDO of a SYNC before it.
-                twice += int(counts[place]) - 1 - number if place else 0
-                break
-            cycles[first[missing.pop() + 1] : first[place + 1] - 1 - number] -= 1
-    return DuePdos(due[cycles], times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum()), len(missing), twice)
-
-
-def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """Numbers of the SYNCs at which a PDO of every n-th is due: where most of some neighbours come.
-
-    Nodes count the SYNCs that they get, a host counts periods: of both the one is taken by which more PDOs are due.
-    """
-    periods = np.arange(len(sync_us))
-    if every == 1:
-        return periods
-    comes = np.bincount(np.searchsorted(sync_us, times_us, side="right"), minlength=len(sync_us) + 1)[1:] > 0
-    ways = (_most_common(comes, count % every, every) for count in (periods, is_sent.cumsum()))
-    return max(ways, key=lambda due: int(np.count_nonzero(comes[due])))
-
-
-def _most_common(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
-    """Numbers of the SYNCs whose rest is the most common one of their block among those after which a PDO comes."""
-    blocks = np.array_split(np.arange(len(rest)), max(len(rest) // (_BLOCK * every), 1))
-    most = [int(np.bincount(rest[block[comes[block]]], minlength=every).argmax()) for block in blocks]
-    return np.concatenate([block[rest[block] == common] for block, common in zip(blocks, most, strict=True)])
-
-
 class _Log:
-    """A log beside the plan, with what is derived of it once."""
+    """A log beside the plan."""
 
     def __init__(self, network: Network, frames: CanFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
-        self.cycle = CanCycle(network, WORST)
+        self.cycle = can_cycle(network, WORST)
         self.traffic = self.cycle.traffic
         self.bit_us = bit_us(self.traffic.bit_rate_kbit_s)
         self.edits: dict[str, Any] = {}
@@ -176,10 +78,10 @@ class _Log:
         self.least_bit_rate = least_bit_rate(frames, self.stretch)
         self.step_us = step_us(self.stretch)
         self.stamp_error_us = self.step_us + self._late_stamps_us()
-        """How far stamps may be wrong: their step, and what frames come closer than the bus allows [us]."""
+        """Largest error of a stamp: the step of stamps, and what frames come closer than the bus allows [us]."""
 
     def _late_stamps_us(self) -> float:
-        """How much closer frames come than the bus sends them, stamped at their ends or at their starts [us]."""
+        """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us]."""
         sent_us = np.concatenate(([0.0], self.frames.bits[self.taken].cumsum() * self.bit_us))
         ahead_us = [wire_us - self.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
         late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
@@ -192,7 +94,7 @@ class _Log:
         return bool(self.traffic.data_bit_rate_kbit_s)
 
     def figures(self) -> Iterator[RecordedFigure]:
-        """All figures."""
+        """Figures of the log beside those of the plan."""
         least = self.least_bit_rate
         if least.likely:
             yield RecordedFigure(
@@ -224,7 +126,7 @@ class _Log:
         yield _limited("frames of no message of the plan", 0, frames, frames, note=note)
 
     def shows_nothing(self) -> Iterator[str]:
-        """Why the log as a whole shows no machine within its plan."""
+        """Reasons why the log as a whole shows no machine within its plan."""
         if max(len(sent.times_us) for sent in self.by_identifier.values()) < LEAST_EVENTS:
             yield f"no identifier comes {LEAST_EVENTS} times: the log is too short"
         if not self.step_us:
@@ -242,7 +144,7 @@ class _Log:
         return _limited(quantity, most, number, events, "limits.missed_cycles", note=note, hidden=hidden)
 
     def _wire_us(self, *, is_stuffed: bool) -> Floats:
-        """Each frame on the wire with the most stuff bits or with none [us]."""
+        """Time of each frame on the wire with the most stuff bits, or with none [us]."""
         taken = self.taken
         us = np.zeros(len(taken))
         nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
@@ -346,7 +248,7 @@ class _Log:
         return None if doubt_us is None else doubt_us + self.stamp_error_us
 
     def _stream(self, stream: Stream, label: str, spread_us: float | None) -> Iterator[RecordedFigure]:
-        """Period, jitter, data and format of a message or of SYNC; of a PDO its data and format."""
+        """Period, jitter, data and format of a message or of SYNC; data and format of a PDO."""
         is_extended = stream.identifier_bits > BASE_BITS
         identifiers = range(stream.first, stream.last + 1)
         sent_frames = [self.by_identifier.get((identifier, is_extended)) for identifier in identifiers]
@@ -464,7 +366,7 @@ class _Log:
                 self.edits[f"{key}.burst"] = model.burst
 
     def _spread_us(self, stream: Stream, shortest_us: float, phases: Mapping[str, Any] | None) -> float | None:
-        """How much the plan lets SYNC or a message arrive sooner than its period: R less the shortest frame [us].
+        """Time by which the plan lets SYNC or a message come sooner than its period: R less the shortest frame [us].
 
         All of a burst may come with its first.
         """
@@ -474,7 +376,7 @@ class _Log:
         return _finite(max(phases["worst_response_us"] - shortest_us, 0.0) + together_us)
 
     def remarks(self) -> Iterator[str]:
-        """What the log has beside the figures."""
+        """Sentences on what the log has beside the figures."""
         frames = self.frames
         yield from faults(frames, self.stretch)
         fd, switched = (int(np.count_nonzero(flags)) for flags in (frames.is_fd, frames.switched))

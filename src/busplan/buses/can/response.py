@@ -9,6 +9,7 @@ that is queued meanwhile by the senders before it, hp(m):
     w(q) = B + S + q C + sum over hp(m) of ceil((w(q) + J + bit) / T) C                the wait of instance q
     R    = the largest J + w(q) - q T + C, over all q with q T < t + J                 the response
 
+`span_us` finds t and w(q), `worst_instance` R, and `responses` B, S and hp(m) of each frame at each point of a sweep.
 Of a burst of b frames b - 1 are in S. An error term E(t) would stand beside S, the delay in a buffer beside J.
 
 References
@@ -19,7 +20,9 @@ revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 
 # Called as math.ceil, so that compiled code calls that of C.
 import math
+from array import array
 from collections.abc import MutableSequence, Sequence
+from typing import Any, NamedTuple
 
 from busplan.buses.can import equations as constants
 
@@ -31,30 +34,89 @@ BELOW = 1 - 1e-9
 """A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
 
 Row = Sequence[float]
-Rows = Sequence[Row]
-"""A row for each point."""
 Results = MutableSequence[float]
+Table = Any
+"""Numbers with a row for each point, an array."""
+
+
+class Senders(NamedTuple):
+    """Senders in the order of arbitration; tables have a column for each of them."""
+
+    group: Sequence[int]
+    """Group of each sender."""
+    place: Row
+    """Place of the first frame of each sender, ascending."""
+    last: Table
+    """Place of the last frame, whose response is found."""
+    frame_us: Table
+    """A frame, C [us]."""
+    blocking_us: Table
+    """A frame that may block; 0 of a sender that may not [us]."""
+    sent_us: Table
+    """All frames of a period [us]."""
+    enough_us: Table
+    """A response that needs no search: a bound that is no longer stands for it [us]."""
+    period_us: Table
+    """Period T of each group, in columns by group [us]."""
+    bit_us: Row
+    """Time of a bit at each point [us]."""
+
+
+class Start(NamedTuple):
+    """Where a busy period begins."""
+
+    once_us: Table
+    """What each sender sends once [us]."""
+    jitter_us: Table
+    """Jitter J of each group, in columns by group; negative where its first frames come behind the start [us]."""
+
+
+class Responses(NamedTuple):
+    """Responses of the longest start; the others say nothing where R is infinite. Columns stand for the answered."""
+
+    blocking_us: Table
+    """B [us]."""
+    instance: Table
+    """q of the worst instance, the first of equals [1]."""
+    wait_us: Table
+    """w(q) [us]."""
+    us: Table
+    """R; infinite where hp(m) and m load the bus by `SATURATED`, or where it takes too many steps to find [us]."""
+
+
+class Messages(NamedTuple):
+    """Messages beside a cycle; tables have a column for each of them."""
+
+    before_us: Table
+    """All frames of a period where it goes before the last PDO, otherwise 0 [us]."""
+    lower_us: Table
+    """A frame where it may block, otherwise 0 [us]."""
+    identifiers: Table
+    """Nodes that send it [1]."""
+    burst: Table
+    """Frames that each of them may queue at once, b [1]."""
+    period_us: Table
+    """Period T [us]."""
+    jitter_us: Table
+    """Jitter J [us]."""
+    deadline_us: Table
+    """Deadline D [us]."""
+
+
+class CycleWaits(NamedTuple):
+    """Waits of a cycle at each point."""
+
+    lasts_us: Row
+    """w [us]."""
+    blocking_us: Row
+    """Frames of lower priorities in it [us]."""
 
 
 def span_us(ahead_us: float, from_us: float, bit_us: float, sent_us: Row, period_us: Row, jitter_us: Row) -> float:
-    """The smallest w = ahead + sum of ceil((w + J + bit) / T) C that is no less than a span that it is known to pass.
+    """The smallest w = ahead + sum of ceil((w + J + bit) / T) C that is no less than `from_us`, which it passes [us].
 
-    Parameters
-    ----------
-    ahead_us
-        What takes time beside the groups [us].
-    from_us
-        The span that it is known to pass [us].
-    bit_us
-        Time in which a frame still takes part in an arbitration that has begun [us].
-    sent_us, period_us, jitter_us
-        Of each group: all frames of a period, the period, and the jitter, which is negative where the first of them
-        come so much behind the start [us].
-
-    Returns
-    -------
-    float
-        w [us]; infinite where it takes over `MOST_STEPS` steps to find.
+    In columns by group: all frames C of a period, T and J. A frame takes part in an arbitration that began within a
+    bit. Infinite where it takes over `MOST_STEPS` steps to find.
     """
     load, least = 0.0, ahead_us
     for group in range(len(sent_us)):
@@ -85,27 +147,9 @@ def bound_us(ahead_us: float, bit_us: float, sent_us: Row, period_us: Row, jitte
 def worst_instance(
     group: int, own_us: float, ahead_us: float, bit_us: float, sent_us: Results, period_us: Row, jitter_us: Row
 ) -> tuple[float, float, float]:
-    """The worst instance of a frame, where the load of the bus is below `SATURATED`.
+    """The worst instance q of a frame C of a group behind B + S, with w(q) and R, below a load of `SATURATED` [1, us].
 
-    Parameters
-    ----------
-    group
-        Its group, whose period and jitter it has.
-    own_us
-        The frame C [us].
-    ahead_us
-        B + S [us].
-    bit_us
-        Time of a bit [us].
-    sent_us
-        Of each group, all frames of a period of hp(m) and of m [us].
-    period_us, jitter_us
-        Of each group [us].
-
-    Returns
-    -------
-    tuple
-        q, the first of equals [1]; w(q), R [us]. R is infinite where it takes too many steps to find.
+    The frames of hp(m) and m are in `sent_us`, by group. R is infinite where it takes too many steps to find.
     """
     own_period_us, own_jitter_us, all_us = period_us[group], jitter_us[group], sent_us[group]
     busy_us = span_us(ahead_us, own_us, 0.0, sent_us, period_us, jitter_us)
@@ -129,65 +173,44 @@ def worst_instance(
     return worst, worst_wait_us, worst_us
 
 
-def responses(
-    answered: Sequence[int],
-    group: Sequence[int],
-    place: Row,
-    last: Rows,
-    frame_us: Rows,
-    blocking_us: Rows,
-    sent_us: Rows,
-    enough_us: Rows,
-    period_us: Rows,
-    bit_us: Rows,
-    once_us: Rows,
-    jitter_us: Rows,
-    longest_us: Results,
-    before_us: Results,
-    blocked_us: Sequence[Results],
-    instance: Sequence[Results],
-    wait_us: Sequence[Results],
-    response_us: Sequence[Results],
-) -> None:
-    """Find the worst-case response of some senders at each point, from one start of the busy period.
+def responses(answered: Sequence[int], senders: Senders, starts: Sequence[Start]) -> Responses:
+    """Worst-case responses of the senders with some ranks at each point, over all starts of the busy period."""
+    import numpy as np  # noqa: PLC0415 - only what waits for messages loads it
 
-    Parameters
-    ----------
-    answered
-        Rank of each sender whose response is computed.
-    group, place
-        Of each sender by its rank: its group, and place of its first frame in the arbitration, ascending.
-    last, frame_us, blocking_us, sent_us, enough_us
-        Of each sender by its rank: place of its last frame, whose response is found; a frame [us]; the same, or 0 where
-        it may not block [us]; all its frames of a period [us]; a response that needs no search, for a bound that is no
-        longer stands for it [us].
-    period_us
-        Of each group [us].
-    bit_us
-        Time of a bit [us].
-    once_us, jitter_us
-        At this start: what each sender sends once, and the jitter of each group [us].
-    longest_us, before_us
-        Room for a number of each sender and one more, and of each group.
-    blocked_us, instance, wait_us, response_us
-        Results, where the response is longer than what is there: B [us], q [1], w(q), R [us]. R is infinite where hp(m)
-        and m load the bus by `SATURATED`, or where it takes too many steps to find. Then the rest says nothing.
-    """
-    senders = len(place)
+    found = Responses(*(np.full((len(senders.bit_us), len(answered)), -math.inf) for _ in Responses._fields))
+    for start in starts:
+        _respond(answered, senders, start, found)
+    return found
+
+
+def _respond(answered: Sequence[int], senders: Senders, start: Start, found: Responses) -> None:
+    """Enter the responses from one start, where they are longer than those found so far."""
+    group, place, last, frame_us, enough_us = (
+        senders.group,
+        senders.place,
+        senders.last,
+        senders.frame_us,
+        senders.enough_us,
+    )
+    blocks_us, sent_us, period_us, bit_us = senders.blocking_us, senders.sent_us, senders.period_us, senders.bit_us
+    once_us, jitter_us = start.once_us, start.jitter_us
+    blocking_us, instance, wait_us, response_us = found.blocking_us, found.instance, found.wait_us, found.us
+    count, groups = len(place), period_us.shape[1]
+    longest_us: Results = array("d", [0.0] * (count + 1))
+    before_us: Results = array("d", [0.0] * groups)
     for point in range(len(bit_us)):
-        ends, frames, blocking = last[point], frame_us[point], blocking_us[point]
+        ends, frames, blocks = last[point], frame_us[point], blocks_us[point]
         sent, once, periods, jitters = sent_us[point], once_us[point], period_us[point], jitter_us[point]
-        longest_us[senders] = 0.0
-        for rank in range(senders - 1, -1, -1):
-            longest_us[rank] = max(longest_us[rank + 1], blocking[rank])
+        for rank in range(count - 1, -1, -1):
+            longest_us[rank] = max(longest_us[rank + 1], blocks[rank])
         rank, load, first_us = 0, 0.0, 0.0
         for number in range(len(answered)):
             sender = answered[number]
             if number == 0 or place[rank - 1] > ends[sender]:
                 rank, load, first_us = 0, 0.0, 0.0
-                for index in range(len(before_us)):
+                for index in range(groups):
                     before_us[index] = 0.0
-            while rank < senders and place[rank] <= ends[sender]:
+            while rank < count and place[rank] <= ends[sender]:
                 before_us[group[rank]] += sent[rank]
                 load += sent[rank] / periods[group[rank]]
                 first_us += once[rank]
@@ -199,53 +222,33 @@ def responses(
                 response = jitters[group[sender]] + bound_us(ahead_us, 0.0, before_us, periods, jitters)
                 if response > enough_us[point][sender]:
                     worst, wait, response = worst_instance(
-                        group[sender], frames[sender], ahead_us, bit_us[point][0], before_us, periods, jitters
+                        group[sender], frames[sender], ahead_us, bit_us[point], before_us, periods, jitters
                     )
             if response > response_us[point][number]:
-                blocked_us[point][number], instance[point][number] = longest_us[rank], worst
+                blocking_us[point][number], instance[point][number] = longest_us[rank], worst
                 wait_us[point][number], response_us[point][number] = wait, response
 
 
-def cycle_waits(
-    most: int,
-    others_us: Rows,
-    bit_us: Rows,
-    before_us: Rows,
-    lower_us: Rows,
-    identifiers: Rows,
-    burst: Rows,
-    period_us: Rows,
-    jitter_us: Rows,
-    deadline_us: Rows,
-    lasts_us: Sequence[Results],
-    blocked_us: Sequence[Results],
-) -> None:
-    """Find how long a cycle lasts with the frames of other messages, at each point.
+def cycle_waits(most: int, others_us: Row, bit_us: Row, messages: Messages) -> CycleWaits:
+    """How long a cycle lasts beside other messages at each point, of which `most` frames may block it.
 
-    Parameters
-    ----------
-    most
-        Frames of lower priorities that it waits for, at most [1].
-    others_us
-        What takes time beside these frames [us].
-    bit_us
-        Time of a bit [us].
-    before_us, lower_us
-        Of each message: all its frames of a period where it goes before the last PDO, or a frame where one may block;
-        otherwise 0 [us].
-    identifiers, burst
-        Of each message: how many nodes send it, and how many frames each of them may queue at once [1].
-    period_us, jitter_us, deadline_us
-        Of each message [us].
-    lasts_us, blocked_us
-        Results: w = others + blocked(w) + sum over the messages before the last PDO of ceil((w + J + bit) / T) C, the
-        smallest, and the frames that block in it [us]. With a load of these messages over `NEARLY_FULL` w is a bound in
-        closed form, which from `SATURATED` on only says that the bus is full.
+    It is the smallest w = others + blocked(w) + sum over the messages before the last PDO of ceil((w + J + bit) / T) C.
+    With a load of these messages over `NEARLY_FULL` w is a bound in closed form, which from `SATURATED` on only says
+    that the bus is full.
     """
+    before_us, lower_us, identifiers, burst = (
+        messages.before_us,
+        messages.lower_us,
+        messages.identifiers,
+        messages.burst,
+    )
+    period_us, jitter_us, deadline_us = messages.period_us, messages.jitter_us, messages.deadline_us
+    lasts_us: Results = array("d", [0.0] * len(bit_us))
+    blocked_us: Results = array("d", [0.0] * len(bit_us))
     for point in range(len(bit_us)):
         before, lower, periods, jitters = before_us[point], lower_us[point], period_us[point], jitter_us[point]
         numbers, bursts, deadlines = identifiers[point], burst[point], deadline_us[point]
-        ahead_us, bit, span, load, blocked, longer = others_us[point][0], bit_us[point][0], 0.0, 0.0, -1.0, 0.0
+        ahead_us, bit, span, load, blocked, longer = others_us[point], bit_us[point], 0.0, 0.0, -1.0, 0.0
         for message in range(len(before)):
             load += before[message] / periods[message]
         while longer > blocked and load <= NEARLY_FULL:
@@ -256,24 +259,16 @@ def cycle_waits(
             blocked = blocking_us(math.inf, most, lower, numbers, bursts, periods, deadlines)
             span = bound_us(ahead_us + blocked, bit, before, periods, jitters)
             blocked = blocking_us(span, most, lower, numbers, bursts, periods, deadlines)
-        lasts_us[point][0], blocked_us[point][0] = span, blocked
+        lasts_us[point], blocked_us[point] = span, blocked
+    return CycleWaits(lasts_us, blocked_us)
 
 
 def blocking_us(
     span: float, most: int, lower_us: Row, identifiers: Row, burst: Row, period_us: Row, deadline_us: Row
 ) -> float:
-    """The longest frames that block within a span of time, three or fewer [us].
+    """The `most` longest frames that block within a span of time, three or fewer [us].
 
     Of a message that keeps its deadline D there are b - 1 + ceil((w + D) / T) frames, of each node.
-
-    Parameters
-    ----------
-    span
-        The span w [us].
-    most
-        Number of frames, at most 3 [1].
-    lower_us, identifiers, burst, period_us, deadline_us
-        As `cycle_waits` takes them.
     """
     first, second, third = 0.0, 0.0, 0.0
     for message in range(len(lower_us)):

@@ -1,4 +1,4 @@
-"""Limits of a CAN bus and of CANopen identifiers, and the rules that only CAN has."""
+"""Limits of a CAN bus and of CANopen identifiers, and the rules of CAN alone."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -7,18 +7,10 @@ from itertools import chain, combinations, product
 from math import inf
 from typing import Final
 
-from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.cycle import WORST, CanCycle, can_cycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
-from busplan.buses.can.frames import (
-    NOT_BY_PRIORITY,
-    Points,
-    Stream,
-    Traffic,
-    last_identifier,
-    repeated,
-    streams,
-    traffic_of,
-)
+from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
+from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, traffic_of
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit
 from busplan.buses.network import Network
@@ -48,7 +40,7 @@ def _slowest(traffic: Traffic) -> Number:
 
 
 _ENDLESS: Final = 1e6
-"""Response over deadline, from which on how late a message is says nothing [1]."""
+"""Response over deadline from which on it is infinite [1]."""
 
 
 def _own_share(traffic: Traffic) -> Number:
@@ -68,7 +60,7 @@ def _unknown_senders(network: Network) -> list[str]:
 
 
 def _kept_from_us(network: Network) -> float:
-    """The period from which on deadlines are kept; infinite where none is long enough, or without a cycle [us]."""
+    """Shortest period that keeps all deadlines; infinite where none does, or without a cycle [us]."""
 
     def is_kept(period_us: float) -> bool:
         traffic = traffic_of(network._replace(period_us=period_us))
@@ -92,7 +84,7 @@ _HALVINGS: Final = 44
 
 
 def _collisions(sent: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
-    """Pairs of streams of plain numbers that share identifiers, with the first they share, and how many."""
+    """Pairs of streams of plain numbers that share identifiers, with the first shared one and their number."""
     ordered = sorted((int(stream.first), place) for place, stream in enumerate(sent))
     pairs = [
         sorted((place, behind))
@@ -153,7 +145,7 @@ def _most_identifier(network: Network) -> Number:
 
 
 def _largest_pdo(network: Network) -> Number:
-    """The largest PDO, or one that is as much over the least room of any as one is over its own [bytes]."""
+    """Largest PDO, or one that is as much over the least room of any as one is over its own [bytes]."""
     largest: Number = 0
     for pdos in traffic_of(network).pdos:
         largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - _least_room(network)))
@@ -161,7 +153,7 @@ def _largest_pdo(network: Network) -> Number:
 
 
 def _least_room(network: Network) -> int:
-    """The least that the frames of any PDO may carry [bytes]."""
+    """Least room of the frames of any PDO [bytes]."""
     return min((pdos.most_bytes for pdos in traffic_of(network).pdos), default=0)
 
 
@@ -175,11 +167,11 @@ def _payload_words(network: Network) -> str:
 
 def _longest(network: Network) -> CanCycle:
     """The cycle with FD frames and bits as long as they may be."""
-    return CanCycle(network, WORST, traffic=traffic_of(network).longest)
+    return can_cycle(network, WORST, traffic=traffic_of(network).longest)
 
 
 def _when_full(load: float) -> str:
-    """Say of a load what comes of it, where it is 1 or more."""
+    """Clause on what a load of 1 or more leads to; empty below."""
     return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
 
 
@@ -209,7 +201,7 @@ class Load(Limit):
 
     def perhaps(self, network: Network) -> Number:
         """Load of the bits that FD frames may take in addition [1]."""
-        return self.value(network) - CanCycle(network, WORST).load
+        return self.value(network) - can_cycle(network, WORST).load
 
     def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:  # noqa: ARG002 - the longest bits count
         """The period at which the load is the largest allowed [us]."""

@@ -13,7 +13,7 @@ from busplan.buses.can.equations import (
     IdentifierBits,
     c,
 )
-from busplan.buses.can.frames import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
+from busplan.buses.can.traffic import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
 from busplan.sections.base import (
     MAX_TIME_US,

@@ -1,29 +1,18 @@
-"""Waits of a cycle for other messages, and worst-case responses: a network's senders in the rows of `response`."""
+"""Waits of a cycle for other messages, and worst-case responses: streams as the records that `response` takes."""
 
 from array import array
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Collection, Container, Iterator, Sequence
 from functools import cache, reduce
 from importlib import import_module
-from math import ceil, inf, isclose
+from math import ceil
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.can import response
 from busplan.buses.can.equations import bit_us, c
-from busplan.buses.can.frames import (
-    NAMES,
-    SYNC,
-    Points,
-    Stream,
-    Traffic,
-    last_place,
-    repeated,
-    repeated_by_place,
-    streams,
-)
+from busplan.buses.can.streams import Points, Stream, last_place, repeated, repeated_by_place, streams
+from busplan.buses.can.traffic import NAMES, SYNC, Traffic, kept
 from busplan.elementwise import choose, is_everywhere, is_off, larger, smaller, total
-from busplan.english import first_of
-from busplan.sourced import cached
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,16 +24,16 @@ class Waits(NamedTuple):
     """Waits of a cycle, from the queued SYNC to the end of the last command."""
 
     lasts_us: Points
-    """All of it [us]."""
+    """Time from the queued SYNC to the end of the last command, w [us]."""
     blocking_us: Points
     """Frames of a lower priority than SYNC and all PDOs that go where these leave the bus idle [us]."""
     lower: tuple[Stream, ...]
-    """Messages that may block it."""
+    """Messages that may block the cycle."""
     most: int
-    """Frames of a lower priority that it waits for, at most [1]."""
+    """Most frames of a lower priority that the cycle waits for [1]."""
 
     def blocks(self) -> list[Stream]:
-        """The message of each frame that blocks, of plain numbers; the longest first."""
+        """Message of each frame that blocks, the longest first; of plain numbers."""
         frames: list[Stream] = []
         for message in sorted(self.lower, key=lambda message: -message.frame_us):
             # As many as are there within the cycle, of a message that keeps its deadline.
@@ -59,19 +48,10 @@ def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
 
 
 def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> Waits:
-    """Find how long a cycle lasts with the frames of other messages.
+    """Time of a cycle that takes `others_us` without the frames of other messages, with them [us].
 
-    Parameters
-    ----------
-    traffic
-        What is sent, as `Traffic.ask` gives it.
-    others_us
-        SYNC, the wait for the slowest feedback, all PDOs and the host's own time [us].
-    due
-        Names of the groups whose PDOs are in the cycle; without it the fullest cycle, and no other lasts longer.
+    `due` names the groups whose PDOs are in the cycle; without it the cycle is the fullest, and no other lasts longer.
 
-    Notes
-    -----
     SYNC, the feedback of the slowest node and the commands each meet an idle bus, or a bus that has just become busy. A
     frame of a lower priority may have started then: three such frames, the longest that can be there. One of a message
     whose deadline D is kept ends within it, so b - 1 + ceil((w + D) / T) of them are there in w. Frames that go before
@@ -91,7 +71,7 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
-    return _waits(_offered(traffic), traffic, others_us, due)
+    return _waits(offered(traffic), traffic, others_us, due)
 
 
 def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> Waits:
@@ -123,23 +103,22 @@ def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: fro
     lower = [(message, message.last_place > last) for message in messages]
     if not traffic.has_sync:
         return Waits(_of_requests_us(before, lower, traffic, others_us), 0.0, (), 0)
-    columns = (
-        [others_us + total(choose(goes, message.burst_us, 0.0) for message, goes in before)],
-        [bit],
-        [choose(goes, message.frames_us, 0.0) for message, goes in before],
-        [choose(blocks, message.frame_us, 0.0) for message, blocks in lower],
-        *([getattr(message, key) for message in messages] for key in _OF_MESSAGES),
+    once_us = total(choose(goes, message.burst_us, 0.0) for message, goes in before)
+    lasts_us, blocking_us = _cycle_waits(
+        most,
+        others_us + once_us,
+        bit,
+        messages,
+        before_us=[choose(goes, message.frames_us, 0.0) for message, goes in before],
+        lower_us=[choose(blocks, message.frame_us, 0.0) for message, blocks in lower],
     )
-    shape, arrays = _arrays(*columns, [0.0], [0.0])
-    _computing().cycle_waits(most, *arrays)
-    lasts_us, blocking_us = (_points(array, 0, shape) for array in arrays[-2:])
     return Waits(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
 
 
 def _of_requests_us(
     before: Sequence[tuple[Stream, Points]], lower: Sequence[tuple[Stream, Points]], traffic: Traffic, others_us: Points
 ) -> Points:
-    """How long a cycle without SYNC lasts with messages that go before its last frame, or block it [us]."""
+    """Time of a cycle without SYNC, with messages that go before its last frame, or block it [us]."""
     messages = [message for message, _ in before]
     late = [
         message._replace(jitter_us=choose(blocks, larger(message.jitter_us, message.deadline_us), message.jitter_us))
@@ -153,72 +132,73 @@ def _of_requests_us(
         (late, [True] * len(late), 0.0),
     ):
         once_us = total(choose(is_sent, message.burst_us, 0.0) for message, is_sent in zip(sent, goes, strict=True))
-        columns = (
-            [others_us + blocked_us + once_us],
-            [bit_us(traffic.bit_rate_kbit_s)],
-            [choose(is_sent, message.frames_us, 0.0) for message, is_sent in zip(sent, goes, strict=True)],
-            [0.0] * len(sent),
-            *([getattr(message, key) for message in sent] for key in _OF_MESSAGES),
+        bound_us, _ = _cycle_waits(
+            int(c.MOST_BLOCKS),
+            others_us + blocked_us + once_us,
+            bit_us(traffic.bit_rate_kbit_s),
+            sent,
+            before_us=[choose(is_sent, message.frames_us, 0.0) for message, is_sent in zip(sent, goes, strict=True)],
+            lower_us=[0.0] * len(sent),
         )
-        shape, arrays = _arrays(*columns, [0.0], [0.0])
-        _computing().cycle_waits(int(c.MOST_BLOCKS), *arrays)
-        bounds_us.append(_points(arrays[-2], 0, shape))
+        bounds_us.append(bound_us)
     return smaller(*bounds_us)
 
 
-def before_the_last(traffic: Traffic, due: frozenset[str] | None, name: str) -> tuple[Points, Points]:
-    """Whether a message goes before the last frame of a cycle, and how late it comes to that [us].
+def _cycle_waits(
+    most: int,
+    others_us: Points,
+    bit: Points,
+    messages: Sequence[Stream],
+    *,
+    before_us: Sequence[Points],
+    lower_us: Sequence[Points],
+) -> tuple[Points, Points]:
+    """Time of a cycle beside some messages, and what blocks in it, as `response.cycle_waits` finds them [us]."""
+    columns: dict[str, Sequence[Points]] = {"before_us": before_us, "lower_us": lower_us}
+    of_messages = ("identifiers", "burst", "period_us", "jitter_us", "deadline_us")
+    columns |= {key: [getattr(message, key) for message in messages] for key in of_messages}
+    shape = _shape([others_us, bit], *columns.values())
+    tables = {key: _table(column, shape) for key, column in columns.items()}
+    found = _computing().cycle_waits(most, _row(others_us, shape), _row(bit, shape), response.Messages(**tables))
+    return _points(found.lasts_us, shape), _points(found.blocking_us, shape)
 
-    Parameters
-    ----------
-    traffic, due
-        As `waits` takes them.
-    name
-        Name of the message.
-    """
-    sent = _offered(traffic)
+
+def before_the_last(traffic: Traffic, due: frozenset[str] | None, name: str) -> tuple[Points, Points]:
+    """Whether a message goes before the last frame of a cycle, whose groups are `due`, and how late it comes [us]."""
+    sent = offered(traffic)
     cyclic = [stream for stream in sent if not stream.is_message]
     (message,) = (stream for stream in arriving(sent, last_place(cyclic)) if stream.is_message and stream.name == name)
     return message.first_place <= last_place(cyclic if due is None else sent_in(cyclic, due)), message.jitter_us
 
 
-_OF_MESSAGES: Final = ("identifiers", "burst", "period_us", "jitter_us", "deadline_us")
-"""What `response.cycle_waits` takes of each message beside its frames."""
-
-
 class Response(NamedTuple):
-    """The worst case of a message: R = J + B + I + q C - (q - b + 1) T + C."""
+    """Worst case of a message: R = J + B + I + q C - (q - b + 1) T + C."""
 
     blocking_us: Points
-    """B, the longest frame of a lower priority [us]."""
+    """Longest frame of a lower priority, B [us]."""
     instance: Points
-    """q of the worst instance in the busy period, from 0 [1]."""
+    """Worst instance q in the busy period, from 0 [1]."""
     interference_us: Points
-    """I, frames of higher priorities that go before it [us]."""
+    """Frames of higher priorities that go before it, I [us]."""
     us: Points
-    """R; infinite without an end, and then the rest says nothing [us]."""
+    """Response R; infinite without an end, and then the rest says nothing [us]."""
 
 
-@cached(maxsize=4)
+@kept
 def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tuple[Stream, Response], ...]:
     """Every message in the order of the profile, with its worst-case response.
 
-    Parameters
-    ----------
-    traffic
-        What is sent, as `Traffic.ask` gives it.
-    is_verdict
-        Whether a bound, without parts, is enough where it shows that a deadline is kept.
+    For a verdict a bound, without parts, is enough where it shows that a deadline is kept.
     """
-    sent = _offered(traffic)
+    sent = offered(traffic)
     messages = [number for number, stream in enumerate(sent) if stream.is_message]
     enough_us = [stream.deadline_us for stream in sent] if is_verdict else None
-    worst = _worst(sent, messages, _starts(sent, traffic), traffic, enough_us=enough_us)
+    worst = _worst(sent, messages, starts(sent, traffic), traffic, enough_us=enough_us)
     return tuple((sent[number], response) for number, response in worst.items())
 
 
-@cached(maxsize=4)
-def _offered(traffic: Traffic) -> tuple[Stream, ...]:
+@kept
+def offered(traffic: Traffic) -> tuple[Stream, ...]:
     """Every stream, with the instant from which on its queue offers it: R - C, the smallest that agrees with itself.
 
     References
@@ -231,7 +211,7 @@ def _offered(traffic: Traffic) -> tuple[Stream, ...]:
     sent = streams(traffic)
     queued = [number for number, stream in enumerate(sent) if stream.is_message and stream.queue_place is not None]
     for _ in range(_ROUNDS if queued else 0):
-        before, worst = sent, _worst(sent, queued, _starts(sent, traffic), traffic)
+        before, worst = sent, _worst(sent, queued, starts(sent, traffic), traffic)
         sent = tuple(
             stream._replace(offered_us=smaller(worst[number].us - stream.frame_us, _NEVER_US))
             if number in worst
@@ -250,9 +230,9 @@ def _offered(traffic: Traffic) -> tuple[Stream, ...]:
 
 
 _ROUNDS: Final = 100
-"""Rounds in which the delays in queues must agree."""
+"""Most rounds until the delays in queues agree."""
 _NEVER_US: Final = 1e12
-"""A delay that ends no more [us]: more than a period may be, and finite, for it is divided by periods."""
+"""Delay without an end [us]: more than a period may be, and finite, for it is divided by periods."""
 
 
 def arriving(sent: Sequence[Stream], end: Points) -> list[Stream]:
@@ -269,30 +249,29 @@ def arriving(sent: Sequence[Stream], end: Points) -> list[Stream]:
 
 
 def sync_response(traffic: Traffic) -> Response:
-    """Worst-case response of SYNC, with arguments as `message_responses` has them.
+    """Worst-case response of SYNC.
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    sent = _beside_sync(_offered(traffic))
-    return _worst(sent, [0], [_Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
+    sent = beside_sync(offered(traffic))
+    return _worst(sent, [0], [Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
 
 
-def _beside_sync(sent: tuple[Stream, ...]) -> tuple[Stream, ...]:
-    """What SYNC may wait for: in a queue it is behind messages alone."""
+def beside_sync(sent: tuple[Stream, ...]) -> tuple[Stream, ...]:
+    """SYNC and the streams that it may wait for: in a queue it is behind messages alone."""
     if sent[0].queue_place is None:
         return sent
     return (sent[0], *(stream for stream in sent if stream.is_message))
 
 
-@cached(maxsize=4)
+@kept
 def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     """SYNC, the last stream of each PDO, and every message, with the worst-case response of its last frame.
 
     Without SYNC a PDO may wait for each other one, as if all were queued at once: messages gather behind those before.
-
-    Arguments are as `message_responses` has them, in plain numbers.
+    Numbers are plain.
     """
-    sent = _offered(traffic)
+    sent = offered(traffic)
     sync = [(sent[0], sync_response(traffic))] if traffic.has_sync else []
     # The last frame of each PDO.
     ends = {
@@ -302,95 +281,22 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     }
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
-    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], traffic).items()]
+    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [Start()], traffic).items()]
     return (*sync, *pdos, *message_responses(traffic))
 
 
-def last_in_queue(traffic: Traffic, place: int) -> Stream | None:
-    """The lowest priority in the queue of a response of `responses`; None where that is by priority.
-
-    Parameters
-    ----------
-    traffic
-        What is sent, in plain numbers.
-    place
-        Place of the response.
-    """
-    answered, _ = responses(traffic)[place]
-    return next((stream for stream in streams(traffic) if stream.last_place == answered.queue_place), None)
-
-
-def counted(traffic: Traffic, place: int) -> tuple[str, str]:
-    """Frames in a response of `responses`, in words: the one that blocks, and those that go before it, by number.
-
-    Parameters
-    ----------
-    traffic
-        What is sent, in plain numbers.
-    place
-        Place of the response.
-    """
-    answered, worst = responses(traffic)[place]
-    higher, blocking, sent = [], "", _offered(traffic)
-    if answered.name == SYNC:
-        sent = _beside_sync(sent)
-    for stream in arriving(sent, answered.end_place):
-        if (stream.block if answered.is_message else stream.first_place) <= answered.end_place:
-            higher.append(stream)
-        elif not blocking and stream.frame_us == worst.blocking_us and (stream.is_message or answered.name != SYNC):
-            blocking = stream.label
-    if not is_off(traffic.error_burst):
-        # The same number of errors hits each place.
-        errors = [*repeated_by_place(streams(traffic), traffic)]
-        higher.append(repeated(higher, traffic)._replace(jitter_us=errors[0].jitter_us))
-    waited_us = worst.blocking_us + worst.interference_us + worst.instance * answered.frame_us
-    window_us = waited_us + bit_us(traffic.bit_rate_kbit_s)
-    for start in _starts(sent, traffic) if answered.is_message else [_Start()]:
-        numbers = [
-            (stream.identifiers - (stream == answered))
-            * (
-                ceil((window_us + start.jitter_us(stream)) / stream.period_us)
-                + stream.burst
-                - 1
-                + (stream.name in start.late)
-            )
-            for stream in higher
-        ]
-        before = [(number, stream) for number, stream in zip(numbers, higher, strict=True) if number]
-        us = sum(number * stream.frame_us for number, stream in before)
-        if isclose(us, worst.interference_us, abs_tol=1e-6):
-            return blocking, first_of(
-                [
-                    f"{number} {stream.label} of {stream.frame_us:g} us{_held(stream, answered.end_place)}"
-                    for number, stream in before
-                ],
-                _LISTED,
-            )
-    return "", ""
-
-
-def _held(stream: Stream, end: Points) -> str:
-    """How late the queue of a stream offers it, in words; empty where it comes when it is queued."""
-    if not stream.is_message or stream.queue_place is None or stream.queue_place <= end:
-        return ""
-    return f", which its queue may hold up to {stream.jitter_us:g} us"
-
-
-_LISTED: Final = 20
-"""Senders whose frames are listed, at most."""
-
-
-class _Start(NamedTuple):
-    """Where in the cycle a busy period begins: late PDOs come at once, and all that is of the cycle in the next one."""
+class Start(NamedTuple):
+    """Instant at which a busy period begins: late PDOs come at once, and all of the cycle in the next one."""
 
     late: Container[str] = ()
+    """Names of the late PDOs."""
     late_us: Points = 0.0
-    """So long behind the start of their cycle they come [us]."""
+    """Time of the late PDOs from the start of their cycle [us]."""
     period_us: Points = 0.0
     """Period of the cycle [us]."""
 
     def jitter_us(self, stream: Stream) -> Points:
-        """Latest queueing of a stream; negative where the first comes so much behind the start [us]."""
+        """Latest queueing of a stream; negative where the first frame comes so much behind the start [us]."""
         if stream.is_message or not self.late:
             return stream.jitter_us
         # Late ones come again with their own period. Of the others any may be due in the next cycle. Where the first
@@ -399,8 +305,8 @@ class _Start(NamedTuple):
         return smaller(self.late_us + stream.jitter_us - again_us, 0.0)
 
 
-def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
-    """Where a busy period of a message may begin: it has the worst of these.
+def starts(sent: Sequence[Stream], traffic: Traffic) -> list[Start]:
+    """Instants at which a busy period of a message may begin: it has the worst of these.
 
     SYNC comes once a period, sooner by its jitter, and feedback and commands behind it. So a busy period that begins
     with SYNC meets each once a period. One that begins with late feedback, or with late commands, meets these, and the
@@ -409,7 +315,7 @@ def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
     before it then is sent in this cycle.
     """
     if not traffic.has_cycle:
-        return [_Start()]
+        return [Start()]
     us = dict.fromkeys((SYNC, _FEEDBACK, _COMMAND), 0.0)
     for stream in sent:
         if not stream.is_message:
@@ -417,41 +323,29 @@ def _starts(sent: Sequence[Stream], traffic: Traffic) -> list[_Start]:
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     lasts_us = _waits(sent, traffic, others_us).lasts_us
     if not traffic.has_sync or any(stream.queue_place is not None and not stream.is_message for stream in sent):
-        return [_Start(), _Start((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
+        return [Start(), Start((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
     commands_us = lasts_us - us[_COMMAND]
     feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
     return [
-        _Start(),
-        _Start((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us),
-        _Start((_COMMAND,), commands_us, traffic.period_us),
+        Start(),
+        Start((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us),
+        Start((_COMMAND,), commands_us, traffic.period_us),
     ]
 
 
 def _worst(
     sent: Sequence[Stream],
-    answered: Sequence[int],
-    starts: Sequence[_Start],
+    answered: Collection[int],
+    begun: Sequence[Start],
     traffic: Traffic,
     *,
     blocks: Sequence[bool] | None = None,
     enough_us: Sequence[Points] | None = None,
 ) -> dict[int, Response]:
-    """Worst-case response of the last frame of some streams, which is the longest of the stream's, by their numbers.
+    """Worst-case response of the last frame of some streams, the longest of each stream, by their numbers in `sent`.
 
-    Parameters
-    ----------
-    sent
-        Every stream; all identifiers from `block` on go first.
-    answered
-        Numbers of those whose response is computed.
-    starts
-        Where a busy period may begin.
-    traffic
-        What else there is: the bit rate and errors.
-    blocks
-        Whether each stream may hold up one that goes before it; without it all may.
-    enough_us
-        Of each stream, a response that a bound may show it to have [us].
+    All identifiers from `block` on go before a stream. Each other stream may hold it up, unless `blocks` says no. Where
+    a bound is no longer than what is enough, it stands for the response.
     """
     levels: dict[object, list[int]] = {}
     for number in answered:
@@ -462,59 +356,59 @@ def _worst(
     worst: dict[int, Response] = {}
     for numbers in levels.values():
         seen = arriving(sent, sent[numbers[0]].end_place)
-        worst |= _searched(seen, numbers, starts, traffic, blocks=blocks, enough_us=enough_us)
+        worst |= _searched(seen, numbers, begun, traffic, blocks=blocks, enough_us=enough_us)
     return {number: worst[number] for number in answered}
 
 
 def _searched(
     sent: Sequence[Stream],
     answered: Sequence[int],
-    starts: Sequence[_Start],
+    begun: Sequence[Start],
     traffic: Traffic,
     *,
     blocks: Sequence[bool] | None,
     enough_us: Sequence[Points] | None,
 ) -> Iterator[tuple[int, Response]]:
-    """Responses of streams that meet the others alike, with arguments as `_worst` has them."""
+    """Responses of streams that meet the others alike, as `response.responses` finds them."""
     both = [*sent, *repeated_by_place(sent, traffic)]
     order = sorted(range(len(both)), key=lambda number: both[number].block)
     ranked, rank_of = [both[number] for number in order], {number: rank for rank, number in enumerate(order)}
     # Senders of equal period and jitters are a group: there are fewer groups than senders.
-    times_us = [(stream.period_us, *(start.jitter_us(stream) for start in starts)) for stream in ranked]
+    times_us = [(stream.period_us, *(start.jitter_us(stream) for start in begun)) for stream in ranked]
     groups: dict[Any, int] = {}
     group = [groups.setdefault(tuple(map(_token, us)), len(groups)) for us in times_us]
     period_us, *jitters_us = zip(*dict(zip(group, times_us, strict=True)).values(), strict=True)
-    columns = (
-        [stream.end_place for stream in ranked],
-        [stream.frame_us for stream in ranked],
-        [
+    onces_us = [
+        [stream.burst_us + (stream.name in start.late) * stream.frames_us for stream in ranked] for start in begun
+    ]
+    columns = {
+        "last": [stream.end_place for stream in ranked],
+        "frame_us": [stream.frame_us for stream in ranked],
+        "blocking_us": [
             both[number].frame_us if number < len(sent) and (blocks is None or blocks[number]) else 0.0
             for number in order
         ],
-        [stream.frames_us for stream in ranked],
-        [0.0 if enough_us is None or number >= len(sent) else enough_us[number] for number in order],
-        period_us,
-        [bit_us(traffic.bit_rate_kbit_s)],
+        "sent_us": [stream.frames_us for stream in ranked],
+        "enough_us": [0.0 if enough_us is None or number >= len(sent) else enough_us[number] for number in order],
+        "period_us": period_us,
+    }
+    bit = bit_us(traffic.bit_rate_kbit_s)
+    shape = _shape([bit], *columns.values(), *onces_us, *jitters_us)
+    found = _computing().responses(
+        array("q", [rank_of[number] for number in answered]),
+        response.Senders(
+            group=array("q", group),
+            place=array("d", [stream.block for stream in ranked]),
+            bit_us=_row(bit, shape),
+            **{key: _table(column, shape) for key, column in columns.items()},
+        ),
+        [
+            response.Start(_table(once_us, shape), _table(jitter_us, shape))
+            for once_us, jitter_us in zip(onces_us, jitters_us, strict=True)
+        ],
     )
-    onces_us = [
-        [stream.burst_us + (stream.name in start.late) * stream.frames_us for stream in ranked] for start in starts
-    ]
-    shape, arrays = _arrays(*columns, *onces_us, *jitters_us, *[[-inf] * len(answered)] * 4)
-    shared, results = arrays[: len(columns)], arrays[-4:]
-    for number in range(len(columns), len(columns) + len(starts)):
-        _computing().responses(
-            array("q", [rank_of[number] for number in answered]),
-            array("q", group),
-            array("d", [stream.block for stream in ranked]),
-            *shared,
-            arrays[number],
-            arrays[number + len(starts)],
-            array("d", [0.0] * (len(ranked) + 1)),
-            array("d", [0.0] * len(groups)),
-            *results,
-        )
     for place, number in enumerate(answered):
-        blocked_us, late, wait_us, us = (_points(result, place, shape) for result in results)
+        blocked_us, late, wait_us, us = (_points(table[:, place], shape) for table in found)
         instance = (late if shape else int(late)) + sent[number].burst - 1
         interference_us = wait_us - blocked_us - instance * sent[number].frame_us
         yield number, Response(blocked_us, instance, interference_us, us)
@@ -525,22 +419,34 @@ def _token(number: Points) -> float:
     return number if isinstance(number, int | float) else id(number)
 
 
-def _arrays(*columns: Sequence[Points]) -> tuple[tuple[int, ...], list["NDArray[Any]"]]:
-    """Shape of the points of all columns together, and each column as an array with a row for each point."""
+def _shape(*columns: Sequence[Points]) -> tuple[int, ...]:
+    """Shape of the points of all columns together; empty where all numbers are plain."""
     import numpy as np  # noqa: PLC0415 - only what waits for messages loads it
 
-    shape = np.broadcast_shapes(*{getattr(number, "shape", ()) for column in columns for number in column})
+    return np.broadcast_shapes(*{getattr(number, "shape", ()) for column in columns for number in column})
+
+
+def _table(column: Sequence[Points], shape: tuple[int, ...]) -> "NDArray[Any]":
+    """A row of the numbers of a column for each point."""
+    import numpy as np  # noqa: PLC0415 - only what waits for messages loads it
+
     if not shape:
-        return shape, [np.array([column], dtype=float) for column in columns]
-    return shape, [
-        np.stack([np.broadcast_to(number, shape).ravel() for number in column], axis=1).astype(float)
-        for column in columns
-    ]
+        return np.array([column], dtype=float)
+    return np.stack([np.broadcast_to(number, shape).ravel() for number in column], axis=1).astype(float)
 
 
-def _points(results: "NDArray[Any]", place: int, shape: tuple[int, ...]) -> Points:
-    """The number at a place of the row of each point."""
-    return results[:, place].reshape(shape) if shape else results[0, place].item()
+def _row(number: Points, shape: tuple[int, ...]) -> Any:
+    """A number at each point."""
+    return _table([number], shape)[:, 0]
+
+
+def _points(row: Any, shape: tuple[int, ...]) -> Points:
+    """Numbers of each point in the shape of the points."""
+    if not shape:
+        return float(row[0])
+    import numpy as np  # noqa: PLC0415 - only what waits for messages loads it
+
+    return np.asarray(row).reshape(shape)
 
 
 def _computing() -> Any:
@@ -550,7 +456,7 @@ def _computing() -> Any:
 
 @cache
 def _compiled() -> ModuleType | None:
-    """The compiled form of `response`; None where there is none."""
+    """`response` compiled; None without a compiler."""
     try:
         return import_module("busplan.buses.can._response")
     except ImportError:  # also if it was built for another Python

@@ -5,7 +5,7 @@ from itertools import groupby
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from busplan.buses.can.frames import HOST
+from busplan.buses.can.traffic import HOST
 from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.questions.import_.can_database import EXTENDED

@@ -1,0 +1,87 @@
+"""PDOs of a CAN log beside the SYNCs at which they were due: late, missing and twice."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.recordings.statistics import Floats
+
+_MADE_UP: Final = 10
+"""Due cycles within which a PDO that is missing may still come."""
+_BLOCK: Final = 50
+"""Due cycles over which PDOs of every n-th SYNC keep their place among the SYNCs."""
+
+
+class DuePdos(NamedTuple):
+    """PDOs of an identifier beside the SYNCs at which they were due."""
+
+    cycles: npt.NDArray[np.int64]
+    """Number of the SYNC at which each PDO was due."""
+    late_us: Floats
+    """Time of each PDO after this SYNC [us]."""
+    due: int
+    """PDOs that were due."""
+    missing: int
+    """PDOs that never came."""
+    twice: int
+    """PDOs that came again for one SYNC."""
+
+
+def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDArray[np.bool_] | None = None) -> DuePdos:
+    """The SYNC at which each PDO was due.
+
+    A PDO comes once for each SYNC that it is due at. Two after one SYNC, where one before had none, are late: they came
+    in their order. One that never comes is missing. A lag of whole periods that never changes cannot be seen.
+
+    Times ascend, those of SYNC one a period, and each PDO comes after some SYNC [us]. It is due at every n-th SYNC. For
+    a SYNC that was not sent a PDO may come, and need not; by default all were sent.
+
+    Examples
+    --------
+    The second of five is late, so that it comes with the third; the fifth SYNC is the last, and nobody knows of it:
+
+    >>> due_pdos(np.arange(5) * 100.0, np.array([30.0, 210, 230, 330]), every=1)[1:]
+    (array([ 30., 110.,  30.,  30.]), 4, 0, 0)
+    """
+    sent = np.ones(len(sync_us), dtype=np.bool_) if is_sent is None else is_sent
+    due = _due_at(sync_us, times_us, every, sent)
+    cycles = np.searchsorted(sync_us[due], times_us, side="right") - 1
+    times_us, cycles = times_us[cycles >= 0], cycles[cycles >= 0]
+    # After the last SYNC the log may end.
+    whole = len(due) - 1
+    counts = np.bincount(cycles, minlength=len(due))[:whole]
+    first = np.searchsorted(cycles, np.arange(len(due) + 1))
+    missing: list[int] = []
+    twice = 0
+    for place in np.flatnonzero(counts != 1).tolist():
+        if not counts[place]:
+            missing += [place] if sent[due[place]] else []
+            continue
+        for number in range(int(counts[place]) - 1):
+            if not missing or place - missing[-1] > _MADE_UP:
+                # The log may begin with a PDO of a SYNC before it.
+                twice += int(counts[place]) - 1 - number if place else 0
+                break
+            cycles[first[missing.pop() + 1] : first[place + 1] - 1 - number] -= 1
+    return DuePdos(due[cycles], times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum()), len(missing), twice)
+
+
+def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """Numbers of the SYNCs at which a PDO of every n-th is due: where most of some neighbours come.
+
+    Nodes count the SYNCs that they get, a host counts periods: of both the one is taken by which more PDOs are due.
+    """
+    periods = np.arange(len(sync_us))
+    if every == 1:
+        return periods
+    comes = np.bincount(np.searchsorted(sync_us, times_us, side="right"), minlength=len(sync_us) + 1)[1:] > 0
+    ways = (_most_common(comes, count % every, every) for count in (periods, is_sent.cumsum()))
+    return max(ways, key=lambda due: int(np.count_nonzero(comes[due])))
+
+
+def _most_common(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
+    """Numbers of the SYNCs whose rest is the most common one of their block among those after which a PDO comes."""
+    blocks = np.array_split(np.arange(len(rest)), max(len(rest) // (_BLOCK * every), 1))
+    most = [int(np.bincount(rest[block[comes[block]]], minlength=every).argmax()) for block in blocks]
+    return np.concatenate([block[rest[block] == common] for block, common in zip(blocks, most, strict=True)])

@@ -1,0 +1,92 @@
+"""A cycle of requests and answers: no SYNC, the host sends a command to each node, which answers with its feedback."""
+
+from collections.abc import Iterable, Iterator
+from functools import cached_property, partial
+
+from busplan.buses.can.alone import OF_SYNC, PREMISES
+from busplan.buses.can.pdos import PdoCycle
+from busplan.buses.can.traffic import NAMES, answer_us
+from busplan.buses.cycle import BusEvent, Run
+from busplan.elementwise import Number, larger
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
+
+
+class RequestCycle(PdoCycle):
+    """Requests and answers: one node after another (polled), or all commands at once (burst), and the window.
+
+    The last answer to commands at once comes no later than all frames and the slowest node together.
+    """
+
+    premises = tuple(premise for premise in PREMISES if premise.key not in OF_SYNC)
+    # A node answers when it has executed, read and write side by side.
+    executions = TRANSACTION_KINDS[:1]
+    blocked = "blocking"
+
+    @property
+    def _is_burst(self) -> bool:
+        """Whether the host sends all commands at once."""
+        return self.traffic.access == "burst"
+
+    @property
+    def bound_words(self) -> str:
+        """Who may wait less than the bound of the cycle says, in words."""
+        return "frames of a burst wait" if self._is_burst else super().bound_words
+
+    @property
+    def sync_us(self) -> Number:
+        """No SYNC [us]."""
+        return 0.0
+
+    def _wait_us(self, kind: TransactionKind, *, uncertainties: int = 0) -> Number:  # noqa: ARG002 - both side by side
+        """Wait for all nodes one by one, or for the slowest, with some standard uncertainties of each [us]."""
+        if not self._groups:
+            return 0.0
+        return answer_us(self._groups, access=self.traffic.access, uncertainties=uncertainties)
+
+    @cached_property
+    def _parts(self) -> tuple[tuple[Run, ...], ...]:
+        """All requests and answers."""
+        return (tuple(self._requests()),)
+
+    def _requests(self) -> Iterator[Run]:
+        """Requests and answers; requests at once all go before the first answer, as the bound has it."""
+        host = BusEvent("host", "cycle_host_us", self.network.profile.bus.host_us, "host", rests_on="bus.host_us")
+        wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest answer")
+        commands, answers = [*self._frames("write")], [*self._frames("read")]
+        if self._is_burst:
+            yield from (Run((host,), self.traffic.requests), *commands, Run((wait,)), *answers)
+            return
+        for group, command, answer in zip(self._groups, commands, answers, strict=True):
+            us = answer_us([group], access="burst")
+            executes = wait._replace(us=us, label="wait for the answer", transaction=NAMES["read"])
+            events = (host, *command.events, executes, *answer.events)
+            yield command._replace(events=events, laid_out=partial(self._of_request, host, command, executes, answer))
+
+    @staticmethod
+    def _of_request(host: BusEvent, command: Run, wait: BusEvent, answer: Run, number: Number) -> Iterator[BusEvent]:
+        """The frames of a request and of its answer."""
+        for before, run in ((host, command), (wait, answer)):
+            yield before
+            if run.laid_out:
+                yield from run.laid_out(number)
+
+    def _opened(self, blocking: BusEvent) -> Iterator[BusEvent | Run]:
+        yield blocking
+
+    def _blocking_us(self, lasts_us: Number, others_us: Number, counts: Iterable[Number]) -> Number:
+        return larger(lasts_us - others_us - self._higher_us(counts), 0.0)
+
+    def possible_us(self) -> Number:
+        """Part of the cycle that only queues add which are not by priority, or times that a burst may hide [us]."""
+        if self._is_burst:
+            return self._terms["cycle_wait_us"] + self._terms["cycle_host_us"]
+        return super().possible_us()
+
+    def _host_doubt_us(self) -> Number:
+        doubt_us: Number = self.traffic.requests * self.network.profile.bus.host_doubt_us
+        return doubt_us
+
+    @property
+    def _pipeline(self) -> Number:
+        # A command goes before the feedback of its cycle.
+        return larger(self.network.profile.bus.pipeline_cycles, 1)
