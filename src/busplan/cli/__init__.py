@@ -9,7 +9,8 @@ from typing import Annotated, Final
 import typer
 
 from busplan import __version__
-from busplan.cli.lazy import SETTINGS, LazyGroup, NoPagerOption
+from busplan.cli.lazy import SETTINGS, LazyGroup
+from busplan.cli.options import NoPagerOption
 from busplan.cli.output import CANNOT, PAGER, PLAN_FAILS, PlanFailsError, mend_streams, say, signals_end_the_run
 from busplan.errors import BusplanError
 

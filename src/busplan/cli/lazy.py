@@ -1,22 +1,17 @@
 """Commands that are loaded when they are called, and the layout of their help: plain names, and exit codes."""
 
-import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
-from copy import copy
-from functools import wraps
 from importlib import import_module
-from inspect import Parameter, cleandoc, signature
 from types import MappingProxyType
-from typing import Annotated, Any, Final, get_args, get_origin
+from typing import Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
 from typer.main import get_command
 
-from busplan.cli.output import PAGER
 from busplan.errors import BusplanError
 
 FAILURES: Final = (
@@ -82,12 +77,18 @@ class PlainCommand(TyperCommand):
 
 
 def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: Any) -> None:
-    for kind in ("argument", "option"):
-        records = (param.get_help_record(ctx) for param in _of_kind(command.get_params(ctx), kind))
-        # Typer adds a Python type to an argument.
-        rows = [(row[0].partition(" <")[0] if kind == "argument" else row[0], row[1]) for row in records if row]
+    """Write arguments and options, each record of options below its title."""
+    sections: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
+    for param in command.get_params(ctx):
+        names, words = param.get_help_record(ctx)
+        if param.param_type_name == "argument":
+            # Typer adds a Python type.
+            sections["Arguments"].append((names.partition(" <")[0], words))
+        else:
+            sections.setdefault(param.rich_help_panel or "Options", []).append((names, words))
+    for title, rows in sections.items():
         if rows:
-            with formatter.section(f"{kind.capitalize()}s"):
+            with formatter.section(title):
                 formatter.write_dl(rows)
 
 
@@ -123,54 +124,6 @@ _MODULES: Final = {
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
-def _declared(command: Callable[..., None]) -> Callable[..., None]:
-    """Give parameters of a command the usage and the help that the section Parameters of its docstring has.
-
-    An entry is an option as the help shows it, `--output,-o FILE`, or the name of an argument in capitals. Parameters
-    without an entry keep what they are annotated with.
-    """
-    words, _, listed = cleandoc(command.__doc__ or "").partition("\n\nParameters\n----------\n")
-    written = signature(command)
-    parameters = dict(written.parameters)
-    for usage, lines in re.findall(r"^(\S.*)\n((?: .*\n?)+)", listed, re.MULTILINE):
-        names, _, value = usage.partition(" ")
-        name = re.split("[,/]", names.lstrip("-"))[0].replace("-", "_").lower()
-        name = name if name in parameters else f"{name}_"
-        annotation, default = parameters[name].annotation, typer.Option() if names.startswith("-") else typer.Argument()
-        kind, info = get_args(annotation) if get_origin(annotation) is Annotated else (annotation, default)
-        info = copy(info)
-        info.help, info.show_default = " ".join(lines.split()).replace(" [default: ", "  [default: "), False
-        if names.startswith("-"):
-            info.param_decls, info.metavar = names.split(","), value or None
-        parameters[name] = parameters[name].replace(annotation=Annotated[kind, info])
-    # Typer reads the signature, and the annotations beside it.
-    command.__signature__ = written.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]
-    command.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
-    command.__doc__ = words
-    return command
-
-
-NoPagerOption = Annotated[
-    bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is longer than the terminal.")
-]
-
-
-def _with_pager_option(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the option `--no-pager`, which also stands before it."""
-
-    @wraps(command)
-    def run(*, no_pager: bool, **values: Any) -> None:
-        if no_pager:
-            os.environ[PAGER] = ""
-        command(**values)
-
-    written = signature(command)
-    last = Parameter("no_pager", Parameter.KEYWORD_ONLY, default=False, annotation=NoPagerOption)
-    run.__signature__ = written.replace(parameters=[*written.parameters.values(), last])  # type: ignore[attr-defined]
-    run.__annotations__ = {**command.__annotations__, "no_pager": NoPagerOption}
-    return run
-
-
 class LazyGroup(TyperGroup):
     """The program's group of commands, each loaded at its first use; its help lists them first."""
 
@@ -183,7 +136,7 @@ class LazyGroup(TyperGroup):
             single = typer.Typer(
                 add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=SETTINGS
             )
-            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(_with_pager_option(_declared(command)))
+            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(command)
             self.commands[cmd_name] = get_command(single)
         return self.commands.get(cmd_name)
 
