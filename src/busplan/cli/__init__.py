@@ -59,7 +59,7 @@ def run() -> None:
     try:
         _require_memory()
         with signals_end_the_run():
-            app(prog_name="busplan")
+            sys.exit(app(prog_name="busplan"))
     except SystemExit as leaving:
         # Typer exits with 2 for usage, 130 for Ctrl-C, and 1 for a closed pipe or other errors, which is no verdict.
         sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)

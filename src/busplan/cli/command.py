@@ -209,7 +209,7 @@ def _parameters(function: Command) -> tuple[bool, dict[str, tuple[type, list[str
     for each in signature(function).parameters.values():
         if each.annotation is Call:
             takes = True
-        elif is_dataclass(each.annotation):
+        elif isinstance(each.annotation, type) and is_dataclass(each.annotation):
             fields = signature(each.annotation).parameters
             records[each.name] = each.annotation, list(fields)
             for field in fields.values():

@@ -187,8 +187,8 @@ class _Written:
             "--format",
             metavar="FORM",
             help="Form of the report: concise is one line for each finding, full shows the line of the file with the "
-            f"value underlined, json is one document; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for "
-            "build services.  [default: full on a terminal, otherwise concise]",
+            f"value underlined, json is one document; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} "
+            "are for build services.  [default: full on a terminal, otherwise concise]",
             envvar="BUSPLAN_FORMAT",
         ),
     ] = None
