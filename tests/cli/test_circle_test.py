@@ -113,7 +113,7 @@ def test_a_step_that_does_not_divide_the_period_is_a_shorter_one_that_does(circl
         (["--trace", "no/where/t.csv"], "cannot be written"),
         (["--trace", "."], "cannot be written"),
         (["--every", "5"], "goes with --trace"),
-        (["--every", "0", "--trace", "t.csv"], "must be greater than or equal to 1"),
+        (["--every", "0", "--trace", "t.csv"], "--every 0: must be 1 or more; "),
         (["--set", "circle.radius_mm=0"], "--set circle.radius_mm=0: must be 0.001 or more"),
         (["--set", "circle.feed_mm_per_min=1e6"], "feed_mm_per_min"),
         (["--set", "delivery.seed=-1"], "--set delivery.seed=-1: must be 0 or more"),

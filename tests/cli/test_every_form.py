@@ -117,7 +117,7 @@ def test_a_picture_goes_to_a_file_and_down_a_pipe(
     assert "there is no folder" in refused(command, "paper-4ms", "-o", "no/picture.svg", cwd=tmp_path)
     monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
     said = refused(command, "paper-4ms", "-o", "new.png", cwd=tmp_path)
-    assert said == "--format png needs resvg_py: install it with the extra, as in pip install 'busplan[plot]'"
+    assert said == "--output new.png needs resvg_py: install it with the extra, as in pip install 'busplan[plot]'"
     assert {path.name for path in tmp_path.iterdir()} == {"pipe", "picture.svg", "picture.png"}
 
 

@@ -231,7 +231,7 @@ def test_a_comparison_stands_in_front_and_leads_to_each_profile(run: Run) -> Non
         (["paper-4ms", "paper-1ms", "--period", "0s"], "--period 0s"),
         (["paper-4ms", "--title", "a\nb"], "--title 'a\\nb': expected words in one line"),
         (["paper-4ms", "--title", " "], "--title ' ': expected words in one line"),
-        (["paper-4ms", "--format", "pdf"], "invalid value for '--format': 'pdf' is not one of 'table'"),
+        (["paper-4ms", "--format", "pdf"], "--format pdf: expected table, markdown, html, csv or json; "),
         ([], "busplan report: missing argument"),
     ],
 )

@@ -239,14 +239,14 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
         (("manual", "plam"), "; did you mean plan?"),
         (("capacity", "gantry"), "; did you mean gantry-24?"),
         (("capacity", "paper-4ms", "paper-1ms"), "unexpected extra argument"),
-        (("plan", "paper-4ms", "--nodes", "two"), "invalid value for '--nodes': must be a valid integer"),
+        (("plan", "paper-4ms", "--nodes", "two"), "--nodes two: expected a whole number; "),
         (
             ("capacity", "paper-4ms", "--timing-model", "neither"),
             "timing_model 'neither': expected 'standard' or 'paper', or a list of them, each once",
         ),
         (
             ("latency", "paper-4ms", "--format", "xml"),
-            "invalid value for '--format': 'xml' is not one of 'table', 'markdown'",
+            "--format xml: expected table, markdown, html, csv or json; ",
         ),
         (
             ("latency", "paper-4ms", "--gap-count", "7"),

@@ -9,7 +9,8 @@ from typing import Annotated, Final
 import typer
 
 from busplan import __version__
-from busplan.cli.lazy import SETTINGS, LazyGroup, NoPagerOption
+from busplan.cli.lazy import SETTINGS, LazyGroup
+from busplan.cli.options import NoPagerOption
 from busplan.cli.output import CANNOT, PAGER, PLAN_FAILS, PlanFailsError, mend_streams, say, signals_end_the_run
 from busplan.errors import BusplanError
 
@@ -58,7 +59,7 @@ def run() -> None:
     try:
         _require_memory()
         with signals_end_the_run():
-            app(prog_name="busplan")
+            sys.exit(app(prog_name="busplan"))
     except SystemExit as leaving:
         # Typer exits with 2 for usage, 130 for Ctrl-C, and 1 for a closed pipe or other errors, which is no verdict.
         sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)

@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from busplan.cli.options import DRAWN_ENDINGS, DrawnForm, form_of_file
+from busplan.cli.options import DrawnForm
 from busplan.cli.output import emit_pages, is_styled, refuse_terminal, say, terminal_size, write_document
 from busplan.errors import BusplanError
 from busplan.extras import require_resvg
 from busplan.files import NewFile, new_file
-from busplan.forms import PICTURES, Form, render
+from busplan.forms import Form, render
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
@@ -23,72 +22,61 @@ if TYPE_CHECKING:
 
 _ALL_SHOWS: Final = "--all shows all."
 _PROFILE: Final = ".toml"
-NOTHING_REFUSED: Final[Mapping[DrawnForm, str]] = MappingProxyType({})
 
 
 @contextmanager
 def answer(
-    form: DrawnForm | None,
+    form: DrawnForm,
     output: Path | None,
     *,
+    typed: str,
     inputs: Iterable[Path] = (),
     changes: KeyChanges = NO_CHANGES,
     is_whole: bool = False,
-    default: Form = "table",
-    refused: Mapping[DrawnForm, str] = NOTHING_REFUSED,
-    is_drawn: bool = False,
 ) -> "Iterator[Callable[[Answer | Report], None]]":
     """Open the destination of an answer before the work, so that a path that cannot be written fails at once.
 
     Parameters
     ----------
     form
-        Value of --format.
+        Form of the answer.
     output
         Value of --output.
+    typed
+        The option that chose the form.
     inputs
         Files that the command reads.
     changes
         Changes of the profile; the answer names those made by --set.
     is_whole
         Value of --all.
-    default
-        Form on standard output without --format.
-    refused
-        Forms that this command does not have, with the reason.
-    is_drawn
-        Whether the answer may also be a picture.
 
     Yields
     ------
     Callable
-        Writes an answer, or its report, to the destination in the chosen form.
+        Writes an answer, or its report, to the destination in the form.
 
     Raises
     ------
     BusplanError
-        The file cannot be written or is an input, the form is refused, or the file name has no known ending; a page of
-        HTML or a PNG would go to a terminal, or resvg-py is missing.
+        The file cannot be written or is an input; a page of HTML or a PNG would go to a terminal, or resvg-py is
+        missing.
     """
-    forms = {ending: name for ending, name in DRAWN_ENDINGS.items() if is_drawn or ending not in PICTURES}
-    chosen = form_of_file(form, output, forms=forms, default=default)
-    if chosen in refused:
-        raise BusplanError(f"--format {chosen}: {refused[chosen]}")
-    if output is None and chosen in ("html", "png"):
-        refuse_terminal(chosen)
-    if chosen == "png":
-        require_resvg(f"--format {chosen}")
+    if output is None and form in ("html", "png"):
+        refuse_terminal(form)
+    if form == "png":
+        require_resvg(typed)
     if output is not None:
         require_apart({"--output": output}, inputs=inputs)
     with ExitStack() as files:
         file = None if output is None else files.enter_context(new_file(output, overwrite=True))
-        yield partial(_give, form=chosen, file=file, changes=changes, is_whole=is_whole)
+        yield partial(_give, form=form, typed=typed, file=file, changes=changes, is_whole=is_whole)
     if output is not None:
         say(f"wrote {output}")
 
 
 def _give(
-    shown: "Answer | Report", form: DrawnForm, file: NewFile | None, changes: KeyChanges, *, is_whole: bool
+    shown: "Answer | Report", *, form: DrawnForm, typed: str, file: NewFile | None, changes: KeyChanges, is_whole: bool
 ) -> None:
     """Write an answer as a picture or as a report, with the --set options named."""
     from busplan.forms.blocks import Report, first_drawing
@@ -101,7 +89,7 @@ def _give(
 
             drawing = first_drawing(shown.blocks) if isinstance(shown, Report) else shown.drawing()
             if drawing is None:
-                raise BusplanError(f"--format {form}: there is nothing to draw")
+                raise BusplanError(f"{typed}: there is nothing to draw")
             note = " ".join(map(sentence_text, changes_sentences(changes)))
             write_document(content(drawing, form, note=note), file)
         case _:

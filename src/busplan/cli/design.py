@@ -3,31 +3,28 @@
 import shlex
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from itertools import chain, product
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import busplan
 from busplan.cli.answering import answer, profile_files, require_apart
+from busplan.cli.command import Call, command
 from busplan.cli.options import (
     STANDARD_OUTPUT,
     VALUES_HELP,
     AllOption,
-    DrawnFormatOption,
-    DrawnOutputOption,
     FormatOption,
     JobsOption,
-    OutputOption,
-    ProfileArgument,
-    load_changed,
-    option,
+    form_of_file,
+    form_typed,
     output_option,
     parse_axis,
     require_company,
-    takes_changes,
     time_us,
 )
 from busplan.cli.output import PlanFailsError, message_width, progress_bar, say, write_document
@@ -36,14 +33,14 @@ from busplan.english import printable
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, Form, ending_expected
-from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_separate
+from busplan.profile.changes import KeyChange, KeyChanges, require_separate
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from busplan.forms.blocks import Report
     from busplan.profile.document import LoadedProfile
     from busplan.questions.base.answer import Answer
-    from busplan.questions.calibrate import CalibrateAnswer
-    from busplan.questions.measured import MeasuredAnswer
-    from busplan.questions.plan import PlanAnswer
 
 
 _PROFILE_ENDINGS = ("", ".toml")
@@ -52,25 +49,58 @@ _LONGEST_NAME = 100
 _LONGEST_DESCRIPTION = 2000
 
 
-@takes_changes("Part of the goal, as --period: it is kept, and --apply and -o write it.", period=True)
+@command("Part of the goal, as --period: it is kept, and --apply and -o write it.", period="one", answers=False)
 def plan_command(
-    profile: ProfileArgument,
-    nodes: int | None = None,
-    changes: KeyChanges = NO_CHANGES,
-    axes: Annotated[int | None, typer.Option(min=1, max=_MAX_AXES)] = None,
-    free: str | None = None,
-    apply: bool = False,
+    call: Call,
+    nodes: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Goal: number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
+        ),
+    ] = None,
+    axes: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            max=_MAX_AXES,
+            help="Goal: number of axes, instead of --nodes; the nodes follow from the profile's "
+            "node.axes.  [default: the axes of the nodes]",
+        ),
+    ] = None,
+    free: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Settings that may change, with commas: keys, as cycle.slice_ratio, or names. On every bus "
+            "slice_ratio, payload (less), period and nodes (fewer); on IEEE 1394 gap_count, responses "
+            "(reads concatenated, writes unified) and schedule; on CAN pdo_per, bit_rate, data_bit_rate, "
+            "identifier_bits and access; on EtherCAT sync_shift; on SERCOS III timing_method; on polled "
+            "buses return_delay, bit_rate and requests.  [default: all but payload and nodes]",
+        ),
+    ] = None,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply", help="Write the recommended values into PROFILE, a file; comments and layout stay as they are."
+        ),
+    ] = False,
     output: Annotated[
         Path | None,
-        option(
-            "--output,-o FILE",
-            f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
             "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
             "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
             "output]",
         ),
     ] = None,
-    force: bool = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
+    ] = False,
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
@@ -85,24 +115,8 @@ def plan_command(
     plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
-
-    Parameters
-    ----------
-    --nodes N
-        Goal: number of distributed nodes, the host not counted. [default: the profile's bus.nodes]
-    --axes N
-        Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes. [default: the axes of
-        the nodes]
-    --free NAMES
-        Settings that may change, with commas: keys, as cycle.slice_ratio, or names. On every bus slice_ratio, payload
-        (less), period and nodes (fewer); on IEEE 1394 gap_count, responses (reads concatenated, writes unified) and
-        schedule; on CAN pdo_per, bit_rate, data_bit_rate, identifier_bits and access; on EtherCAT sync_shift; on SERCOS
-        III timing_method; on polled buses return_delay, bit_rate and requests. [default: all but payload and nodes]
-    --apply
-        Write the recommended values into PROFILE, a file; comments and layout stay as they are.
-    --force
-        Let -o NEW.toml overwrite a file that is already there.
     """
+    changes = call.changes
     if nodes is not None:
         changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.entries))
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
@@ -113,19 +127,18 @@ def plan_command(
         )
     new = None if report_file is not None else output
     _check_options(changes, axes=axes, apply=apply, new=new, force=force, format_=format_)
-    piped = new == STANDARD_OUTPUT
-    require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
-    with answer(format_, report_file, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.profile.sources import load
-        from busplan.questions.plan import plan
-
+    piped, inputs = new == STANDARD_OUTPUT, [*profile_files(call.argument)]
+    require_apart({"--output": None if piped else new}, inputs=inputs, of_profiles=True)
+    form: Form = form_of_file(format_, report_file, forms=ENDINGS, default="table")
+    typed = form_typed(format_, report_file)
+    with answer(form, report_file, typed=typed, inputs=inputs, changes=changes, is_whole=all_) as give:
         if apply:
-            require_own_file(profile)
-        loaded = load(profile)
+            require_own_file(call.argument)
+        loaded = call.loaded
         with ExitStack() as files:
             # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
-            result = plan(
+            result = busplan.plan(
                 loaded.profile,
                 axes=axes,
                 changes=changes,
@@ -135,7 +148,7 @@ def plan_command(
                 _write_profile(loaded, result, file, name=None if piped else new.stem)
         if result.recommended is None:
             if apply or new:
-                say(f"{profile if apply else new}: not written, for there is no plan")
+                say(f"{call.argument if apply else new}: not written, for there is no plan")
         elif apply:
             _apply(loaded, result)
         elif file is not None:
@@ -162,7 +175,7 @@ def _check_options(
         raise BusplanError(*problems)
 
 
-def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
+def _apply(loaded: "LoadedProfile", result: "busplan.PlanAnswer") -> None:
     """Write the recommended values into the profile's file."""
     if not result.recommended_changes:
         say(f"{loaded.document.name}: nothing to change, left as it is")
@@ -171,7 +184,9 @@ def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
     say(f"changed {loaded.document.name}: {result.recommended_words}")
 
 
-def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile | None, *, name: str | None) -> None:
+def _write_profile(
+    loaded: "LoadedProfile", result: "busplan.PlanAnswer", file: NewFile | None, *, name: str | None
+) -> None:
     """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged.
 
     A file is another plan than the profile: it has another name, and its description names the profile that it comes
@@ -191,7 +206,7 @@ def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile 
         file.abandon()
 
 
-def _choices(result: "PlanAnswer") -> dict[str, object]:
+def _choices(result: "busplan.PlanAnswer") -> dict[str, object]:
     """The recommended values by key, as a file has them."""
     from busplan.profile.edit import whole
 
@@ -207,18 +222,38 @@ def _say_report(changes: KeyChanges, result: "Answer") -> None:
     say(*(line.text for line in block_lines(blocks, width=message_width())))
 
 
-@takes_changes("For a bench that differed from the profile: --apply does not write it.")
+@command(
+    "For a bench that differed from the profile: --apply does not write it.",
+    reads=lambda measurements, **_: _measurements_file(measurements),
+)
 def calibrate_command(
-    profile: ProfileArgument,
-    measurements: str,
-    group: str | None = None,
-    timing_model: str | None = None,
-    changes: KeyChanges = NO_CHANGES,
-    apply: bool = False,
-    all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-) -> None:
+    call: Call,
+    measurements: Annotated[
+        str,
+        typer.Argument(
+            help="A CSV file of measured latencies, the shipped example table-1.csv, or - for standard input."
+        ),
+    ],
+    group: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="In a profile with groups: the group of nodes that was measured.  [default: its one group]",
+        ),
+    ] = None,
+    timing_model: Annotated[
+        str | None,
+        typer.Option(metavar="MODEL", help="Timing model that computes the packets.  [default: the one that decides]"),
+    ] = None,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help="Write [node.execution], or that of the group, into the file PROFILE, with a comment on its "
+            "origin; your own comments stay.",
+        ),
+    ] = False,
+) -> "Report":
     """Find the execution time T_exec of a node from latencies measured on an IEEE 1394 bus.
 
     The CSV file has a header, the columns payload_bytes and latency_us (T_lant, from the request to its last
@@ -232,54 +267,38 @@ def calibrate_command(
     Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv
-
-    Parameters
-    ----------
-    MEASUREMENTS
-        A CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.
-    --group NAME
-        In a profile with groups: the group of nodes that was measured. [default: its one group]
-    --timing-model MODEL
-        Timing model that computes the packets. [default: the one that decides]
-    --apply
-        Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; your own
-        comments stay.
     """
-    if profile == measurements == "-":
+    if call.argument == measurements == "-":
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
     if apply:
-        require_own_file(profile)
-    files = chain(profile_files(profile), _measurements_file(measurements))
-    with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
-        from busplan.profile.document import read_bytes
-        from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES
-        from busplan.profile.sources import load, locate_measurements
-        from busplan.questions.calibrate import calibrate
+        require_own_file(call.argument)
+    from busplan.profile.document import read_bytes
+    from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES
+    from busplan.profile.sources import locate_measurements
 
-        loaded = load(profile)
-        bench = changes.applied(loaded.profile)
-        path, name, shipped = locate_measurements(measurements)
-        calibration = calibrate(
-            bench,
-            # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
-            measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
-            group=group,
-            timing_model=timing_model,
-            source=name,
-        )
-        if apply:
-            _write_edits(loaded, changes, calibration, words=f"[{' '.join(calibration.notes)}]")
-        give(calibration.report(applied_to=profile if apply else None))
+    bench = call.profile
+    path, name, shipped = locate_measurements(measurements)
+    calibration = busplan.calibrate(
+        bench,
+        # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
+        measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
+        group=group,
+        timing_model=timing_model,
+        source=name,
+    )
+    if apply:
+        _write_edits(call, calibration, words=f"[{' '.join(calibration.notes)}]")
+    return calibration.report(applied_to=call.argument if apply else None)
 
 
-def _write_edits(
-    loaded: "LoadedProfile", changes: KeyChanges, answer: "CalibrateAnswer | MeasuredAnswer", *, words: str
-) -> None:
+def _write_edits(call: Call, answer: "busplan.CalibrateAnswer | busplan.MeasuredAnswer", *, words: str) -> None:
     """Write what was measured into the profile's file, but for keys that --set gives for the measurement."""
-    for change, key in product(changes.by_set, answer.edits):
+    for change, key in product(call.changes.by_set, answer.edits):
         require_separate(change, key, typed="--apply")
-    apply_changes(loaded.document, answer.edits, notes=answer.notes)
-    say(f"wrote {words} of {loaded.document.name}; your comments are kept: see whether they hold of the new values")
+    apply_changes(call.loaded.document, answer.edits, notes=answer.notes)
+    say(
+        f"wrote {words} of {call.loaded.document.name}; your comments are kept: see whether they hold of the new values"
+    )
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:
@@ -290,18 +309,40 @@ def _measurements_file(argument: str) -> Iterator[Path]:
         yield locate_measurements(argument).path
 
 
-@takes_changes("For a machine that was recorded with another value: --apply does not write it.")
+@command(
+    "For a machine that was recorded with another value: --apply does not write it.",
+    reads=lambda recording, **_: (Path(recording),),
+)
 def measured_command(
-    profile: ProfileArgument,
-    recording: str,
-    quantile: float = 1.0,
-    channel: str | None = None,
-    changes: KeyChanges = NO_CHANGES,
-    apply: bool = False,
-    all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-) -> None:
+    call: Call,
+    recording: Annotated[
+        str,
+        typer.Argument(
+            help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, "
+            "BLF or TRC, or a capture of SocketCAN."
+        ),
+    ],
+    quantile: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE",
+            help="Share of the cycles that jitter and times are to hold for, 0.5..1 [1].  [default: 1, the worst "
+            "recorded]",
+            show_default=False,
+        ),
+    ] = 1.0,
+    channel: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
+    ] = None,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help="Write the values that were measured into the file PROFILE, with a comment on their origin; "
+            "your own comments stay.",
+        ),
+    ] = False,
+) -> "Report":
     """Show what the machine does by a recording of its bus, beside what was planned.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
@@ -310,47 +351,37 @@ def measured_command(
     us. `busplan manual measured` says how each figure is measured. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
-
-    Parameters
-    ----------
-    RECORDING
-        A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or TRC, or a
-        capture of SocketCAN.
-    --quantile SHARE
-        Share of the cycles that jitter and times are to hold for, 0.5..1 [1]. [default: 1, the worst recorded]
-    --channel NAME
-        Channel of a CAN log. [default: the only one]
-    --apply
-        Write the values that were measured into the file PROFILE, with a comment on their origin; your own comments
-        stay.
     """
     if apply:
-        require_own_file(profile)
-    files = chain(profile_files(profile), [Path(recording)])
-    with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
-        from busplan.profile.sources import load
-        from busplan.questions.measured import measured
-
-        loaded = load(profile)
-        with progress_bar("recording") as progress:
-            plan = changes.applied(loaded.profile)
-            seen = measured(plan, recording, quantile=quantile, channel=channel, progress=progress)
-        if apply and not seen.edits:
-            why = f": {'; '.join(seen.shows_nothing)}" if seen.shows_nothing else ""
-            raise BusplanError(f"--apply: {recording} shows no value of a key{why}")
-        if apply:
-            _write_edits(loaded, changes, seen, words=", ".join(seen.edits))
-        give(seen.report(applied_to=profile if apply else None))
+        require_own_file(call.argument)
+    with progress_bar("recording") as progress:
+        seen = busplan.measured(call.profile, recording, quantile=quantile, channel=channel, progress=progress)
+    if apply and not seen.edits:
+        why = f": {'; '.join(seen.shows_nothing)}" if seen.shows_nothing else ""
+        raise BusplanError(f"--apply: {recording} shows no value of a key{why}")
+    if apply:
+        _write_edits(call, seen, words=", ".join(seen.edits))
+    return seen.report(applied_to=call.argument if apply else None)
 
 
-@takes_changes("For a machine that differs from its plan.", period=True)
+@command("For a machine that differs from its plan.", period="one", answers=False)
 def emulate_command(
-    profile: ProfileArgument,
-    cycles: int | None = None,
-    duration: str | None = None,
-    fault: list[str] | None = None,
-    seed: int = 1,
-    changes: KeyChanges = NO_CHANGES,
+    call: Call,
+    cycles: Annotated[
+        int | None, typer.Option(metavar="N", help="Length of the recording, in cycles.  [default: 1000]")
+    ] = None,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="The same as a time with its unit.  [default: --cycles]")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[=VALUE]",
+            help="A fault of the machine; may be repeated. VALUE is how often it happens, as lost-frame=3, or "
+            "how late, as jitter=50us.  [default: 5 times, a share of the period]",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of jitter and data: the same gives the same bytes.")] = 1,
     output: Annotated[Path | None, output_option("Write the recording to FILE.pcapng, FILE.log or .candump")] = None,
 ) -> None:
     """Write the recording that the planned machine would give, so that software is tried before the machine exists.
@@ -360,24 +391,11 @@ def emulate_command(
     CAN: missing-cycle, missing-pdo, double-pdo, late-command, jitter, error-frame. Exits 0 when it is written.
 
     Example: busplan emulate can-servo-8 --fault late-command -o log.candump
-
-    Parameters
-    ----------
-    --cycles N
-        Length of the recording, in cycles. [default: 1000]
-    --duration TIME
-        The same as a time with its unit. [default: --cycles]
-    --fault NAME[=VALUE]
-        A fault of the machine; may be repeated. VALUE is how often it happens, as lost-frame=3, or how late, as
-        jitter=50us. [default: 5 times, a share of the period]
-    --seed N
-        Of jitter and data: the same gives the same bytes. [default: 1]
     """
-    require_apart({"--output": output}, inputs=profile_files(profile))
-    from busplan.questions.emulate import emulate, emulator_of
+    require_apart({"--output": output}, inputs=profile_files(call.argument))
+    from busplan.questions.emulate import emulator_of
 
-    plan = load_changed(profile, changes)
-    faults, endings, *_ = emulator_of(plan)
+    faults, endings, *_ = emulator_of(call.profile)
     if output is not None and output.suffix.lower() not in endings:
         raise BusplanError(f"--output {output}: {ending_expected(output.suffix, endings)}")
     if output is None and sys.stdout.isatty():
@@ -387,11 +405,11 @@ def emulate_command(
     given = dict(_fault(text, units) for text in fault or [])
     with ExitStack() as files:
         file = None if output is None else files.enter_context(new_file(output, overwrite=True))
-        made = emulate(plan, cycles=cycles, duration_us=length_us, seed=seed, fault=given)
+        made = busplan.emulate(call.profile, cycles=cycles, duration_us=length_us, seed=seed, fault=given)
         write_document(made.content, file)
     if output is not None:
         say(f"wrote {output}")
-    _say_report(changes, made)
+    _say_report(call.changes, made)
 
 
 def _fault(text: str, units: Mapping[str, str]) -> tuple[str, Any]:
@@ -402,27 +420,46 @@ def _fault(text: str, units: Mapping[str, str]) -> tuple[str, Any]:
     return name, int(value) if value.isdecimal() else value or None
 
 
+def _varied(name: str, words: str, *, default: str) -> Any:
+    """The option of a key and its values."""
+    return typer.Option(name, metavar="KEY=VALUES", help=f"{words}{VALUES_HELP}  [default: {default}]")
+
+
 def _direction(name: str, *, default: str) -> Any:
-    return option(
-        f"{name} KEY=VALUES",
+    words = (
         f"Quantity on the {name[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the number "
         "of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
-        f"{VALUES_HELP}  [default: {default}]",
     )
+    return _varied(name, words, default=default)
 
 
-@takes_changes("For a key on an axis of the map, it moves the mark.", period=True)
+def _axes(**texts: str | None) -> dict[str, dict[str, str] | None]:
+    """Values by key of each direction; None for one that is not given."""
+    return {
+        name: None if text is None else dict([parse_axis(text, option=f"--{name}")]) for name, text in texts.items()
+    }
+
+
+@contextmanager
+def _crew(jobs: int | None, *, circle: bool) -> "Iterator[Executor | None]":
+    """Where circle tests run; None for this process."""
+    require_company("--circle", {"--jobs": jobs}, is_given=circle)
+    from busplan.cli.workers import available_processors, executor
+
+    with executor((jobs or available_processors()) if circle else 1) as crew:
+        yield crew
+
+
+@command("For a key on an axis of the map, it moves the mark.", period="one", is_drawn=True)
 def map_command(
-    profile: ProfileArgument,
+    call: Call,
     x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
     y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
-    changes: KeyChanges = NO_CHANGES,
-    circle: bool = False,
+    circle: Annotated[
+        bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
+    ] = False,
     jobs: JobsOption = None,
-    all_: AllOption = False,
-    format_: DrawnFormatOption = None,
-    output: DrawnOutputOption = None,
-) -> None:
+) -> "Answer":
     """Draw where a design fits: period against axes, any two keys of the profile, or the curve of one.
 
     Each cell is the verdict of `busplan capacity` for its two values: fits, not shown to fit, does not fit, or an
@@ -432,44 +469,27 @@ def map_command(
     Exits 0 with any verdict.
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
-
-    Parameters
-    ----------
-    --circle
-        Also run the circle test of every cell that fits, up to 1,000.
     """
-    require_company("--circle", {"--jobs": jobs}, is_given=circle)
-    files = profile_files(profile)
-    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
-        from busplan.cli.workers import available_processors, executor
-        from busplan.questions.map import map_
-
-        along_x, along_y = (
-            None if text is None else dict([parse_axis(text, option=name)]) for name, text in (("--x", x), ("--y", y))
-        )
-        processes = (jobs or available_processors()) if circle else 1
-        with progress_bar("map") as progress, executor(processes) as crew:
-            trade_off = map_(
-                load_changed(profile, changes), x=along_x, y=along_y, circle=circle, progress=progress, executor=crew
-            )
-        give(trade_off)
+    with progress_bar("map") as progress, _crew(jobs, circle=circle) as crew:
+        return busplan.map_(call.profile, **_axes(x=x, y=y), circle=circle, progress=progress, executor=crew)
 
 
-@takes_changes("For a key of a slider, it moves the first setting.", period=True)
+@command("For a key of a slider, it moves the first setting.", period="one", is_drawn=True, has_all=False)
 def explore_command(
-    profile: ProfileArgument,
+    call: Call,
     x: Annotated[str | None, _direction("--x", default="as `busplan map`")] = None,
     y: Annotated[str | None, _direction("--y", default="as `busplan map`")] = None,
     over: Annotated[
         str | None,
-        option("--over KEY=VALUES", f"A third key: {VALUES_HELP}  [default: the larger payload of a node]"),
+        typer.Option(
+            "--over", metavar="KEY=VALUES", help=f"A third key: {VALUES_HELP}  [default: the larger payload of a node]"
+        ),
     ] = None,
-    changes: KeyChanges = NO_CHANGES,
-    circle: bool = False,
+    circle: Annotated[
+        bool, typer.Option("--circle", help="Also run the circle test of every setting that fits.")
+    ] = False,
     jobs: JobsOption = None,
-    format_: DrawnFormatOption = None,
-    output: DrawnOutputOption = None,
-) -> None:
+) -> "Answer":
     """Write a page with sliders that shows what a change does: to the period, the nodes, the payload.
 
     Every setting is computed now, and the page shows its card and its place on the map: one file to open in a browser
@@ -477,27 +497,10 @@ def explore_command(
     all. Exits 0 with any verdict.
 
     Example: busplan explore gantry-24 -o gantry-24.html
-
-    Parameters
-    ----------
-    --circle
-        Also run the circle test of every setting that fits.
     """
-    require_company("--circle", {"--jobs": jobs}, is_given=circle)
-    files = profile_files(profile)
-    with answer(format_, output, inputs=files, changes=changes, is_drawn=True) as give:
-        from busplan.cli.workers import available_processors, executor
-        from busplan.questions.explore import explore
-
-        axes = {
-            name: None if text is None else dict([parse_axis(text, option=f"--{name}")])
-            for name, text in (("x", x), ("y", y), ("over", over))
-        }
-        with (
-            progress_bar("explore") as progress,
-            executor((jobs or available_processors()) if circle else 1) as crew,
-        ):
-            give(explore(load_changed(profile, changes), **axes, circle=circle, progress=progress, executor=crew))
+    with progress_bar("explore") as progress, _crew(jobs, circle=circle) as crew:
+        axes = _axes(x=x, y=y, over=over)
+        return busplan.explore(call.profile, **axes, circle=circle, progress=progress, executor=crew)
 
 
 def _complete_kinds(incomplete: str) -> list[str]:
@@ -508,15 +511,18 @@ def _complete_kinds(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
 
 
-@takes_changes("It changes the profile before that is put on other kinds.", period=True)
+@command("It changes the profile before that is put on other kinds.", period="one", is_drawn=True)
 def compare_command(
-    profile: ProfileArgument,
-    buses: Annotated[str | None, typer.Option(autocompletion=_complete_kinds)] = None,
-    changes: KeyChanges = NO_CHANGES,
-    all_: AllOption = False,
-    format_: DrawnFormatOption = None,
-    output: DrawnOutputOption = None,
-) -> None:
+    call: Call,
+    buses: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND[,KIND...]",
+            autocompletion=_complete_kinds,
+            help="Kinds of bus, by their bus.kind.  [default: all, the profile's own first]",
+        ),
+    ] = None,
+) -> "Answer":
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
     The kinds are the paper's, IEEE 1394, CAN, SERCOS and polled buses (PROFIBUS, WorldFIP), and
@@ -528,21 +534,13 @@ def compare_command(
     shown to fit; the most axes are those at the profile's period. Exits 0 with any verdict.
 
     Example: busplan compare gantry-24
-
-    Parameters
-    ----------
-    --buses KIND[,KIND...]
-        Kinds of bus, by their bus.kind. [default: all, the profile's own first]
     """
-    files = profile_files(profile)
-    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
-        from busplan.questions.compare import compare
-
-        kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
-        # A constant may be one of another kind than the profile's.
-        give(compare(load_changed(profile, changes.of_profile), buses=kinds))
+    kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
+    # A constant may be one of another kind than the profile's.
+    return busplan.compare(call.changes.of_profile.applied(call.loaded.profile), buses=kinds)
 
 
+@command(of="nothing", answers=False)
 def import_command(
     paths: Annotated[
         list[str],
@@ -552,13 +550,43 @@ def import_command(
             show_default=False,
         ),
     ],
-    output: Path | None = None,
-    bus: str | None = None,
-    channel: str | None = None,
-    period: str | None = None,
-    nodes: str | None = None,
-    bit_rate: float | None = None,
-    force: bool = False,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="NEW.toml", help="Write the profile to a new file.  [default: standard output]"
+        ),
+    ] = None,
+    bus: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Bus of a database of messages.  [default: the only one]")
+    ] = None,
+    channel: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
+    ] = None,
+    period: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so "
+            "the plan is not shown to fit.  [default: such messages are left out]",
+        ),
+    ] = None,
+    nodes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NODES",
+            help="Nodes that one EDS stands for: their number, as 8, from node-ID 1 on, or their node-IDs, as "
+            "1-8,11.  [default: one]",
+        ),
+    ] = None,
+    bit_rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATE",
+            help="Bit rate of a CAN bus, before that of any file [kbit/s].  [default: that of a file, or that "
+            "which frames of a log directly after each other show]",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
@@ -571,26 +599,6 @@ def import_command(
     when the profile is written, with any verdict.
 
     Example: busplan import machine.xml slaves.txt -o machine.toml
-
-    Parameters
-    ----------
-    --output,-o NEW.toml
-        Write the profile to a new file. [default: standard output]
-    --bus NAME
-        Bus of a database of messages. [default: the only one]
-    --channel NAME
-        Channel of a CAN log. [default: the only one]
-    --period TIME
-        Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is not
-        shown to fit. [default: such messages are left out]
-    --nodes NODES
-        Nodes that one EDS stands for: their number, as 8, from node-ID 1 on, or their node-IDs, as 1-8,11.
-        [default: one]
-    --bit-rate RATE
-        Bit rate of a CAN bus, before that of any file [kbit/s]. [default: that of a file, or that which frames of a
-        log directly after each other show]
-    --force
-        Let -o overwrite a file that is already there.
     """
     if paths.count("-") > 1:
         raise BusplanError("-: only one FILE can be standard input")
@@ -602,10 +610,8 @@ def import_command(
     with ExitStack() as files:
         # Opened before the work, so that a path that cannot be written fails at once.
         file = None if new is None else files.enter_context(new_file(new, overwrite=force))
-        from busplan.questions.import_ import import_profile
-
         with progress_bar("recording") as progress:
-            imported = import_profile(
+            imported = busplan.import_profile(
                 paths,
                 name=None if new is None else new.stem,
                 bus=bus,

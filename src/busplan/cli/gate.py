@@ -1,34 +1,26 @@
 """Commands of the gate: check, diff, rule and schema."""
 
 import sys
+from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias
 
 import typer
 
-from busplan.cli.answering import answer, profile_files, require_apart
-from busplan.cli.options import (
-    AllOption,
-    FormatOption,
-    OutputOption,
-    TimingModelOption,
-    chosen_model,
-    complete_profile,
-    load_each,
-    option,
-    output_option,
-    require_company,
-    takes_changes,
-)
+import busplan
+from busplan.cli.answering import profile_files, require_apart
+from busplan.cli.command import Call, Fails, command, load_each
+from busplan.cli.options import TimingModelOption, chosen_model, complete_profile, output_option, require_company
 from busplan.cli.output import PlanFailsError, emit_document, emit_text, is_styled, say, terminal_size
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.files import document_bytes, write_file
 from busplan.gate.formats import FORMATS
-from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,10 +28,12 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from busplan.buses.rule import Severity
+    from busplan.forms.blocks import Report
     from busplan.gate.baseline import Baseline
     from busplan.gate.gate import FileResult
     from busplan.gate.report import CheckReport
-    from busplan.profile.sources import ProfileSource
+    from busplan.profile.sources import Collection, ProfileSource
+    from busplan.questions.base.answer import Answer
 
     FormatName = str
 else:
@@ -51,11 +45,168 @@ _WIDTH: Final = 80
 _BUILD_FORMATS: Final = [name for name, report_format in FORMATS.items() if report_format.reader == "builds"]
 
 
-@takes_changes(
+_OptionOf: TypeAlias = Callable[[str, Any, Any], Any]
+"""Value of an option by its name, value and default: as given, or else that of the settings."""
+
+
+@dataclass(frozen=True)
+class _Selection:
+    """Findings that count."""
+
+    select: Annotated[
+        str | None,
+        typer.Option(metavar="CODES", help="Rules that count, as BP1,BP301: beginnings of codes.  [default: all]"),
+    ] = None
+    ignore: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CODES", help="Rules that do not count, as BP112; the longest beginning decides.  [default: none]"
+        ),
+    ] = None
+    show_suppressed: Annotated[
+        bool, typer.Option("--show-suppressed", help="Also name suppressed findings, each with its reason.")
+    ] = False
+    fail_on: Annotated[
+        Literal["error", "warning"] | None, typer.Option(help="Least severity that fails the check.  [default: error]")
+    ] = None
+    exit_zero: Annotated[bool, typer.Option("--exit-zero", help="Exit 0 even with findings; 2 stays 2.")] = False
+
+    def arguments(self, option_of: "_OptionOf") -> dict[str, Any]:
+        """Arguments of `check`."""
+        return {
+            "select": option_of("select", _codes(self.select), ()),
+            "ignore": option_of("ignore", _codes(self.ignore), ()),
+            "per_file_ignores": option_of("per-file-ignores", None, {}),
+        }
+
+    def least(self, option_of: "_OptionOf") -> "Severity | None":
+        """Least severity that fails the check; None if no finding does."""
+        severity: Severity = option_of("fail-on", self.fail_on, "error")
+        return None if self.exit_zero else severity
+
+
+@dataclass(frozen=True)
+class _Circle:
+    """Circle tests."""
+
+    circle: Annotated[
+        bool | None,
+        typer.Option(help="Run the circle test of profiles that ask for one, or leave it out.  [default: run it]"),
+    ] = None
+    circle_steps: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of "
+            "it.  [default: 10000000]",
+        ),
+    ] = None
+
+    def arguments(self, option_of: "_OptionOf") -> dict[str, Any]:
+        """Arguments of `check`."""
+        circle = option_of("circle", self.circle, True)
+        require_company("--circle", {"--circle-steps": self.circle_steps}, is_given=circle)
+        steps = option_of("circle-steps", self.circle_steps, None) if circle else None
+        return {"circle": circle, **({} if steps is None else {"circle_steps": steps})}
+
+
+@dataclass(frozen=True)
+class _Baseline:
+    """Baseline."""
+
+    baseline: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="File with recorded axes and margins, which no profile may lose.  [default: none]"
+        ),
+    ] = None
+    update_baseline: Annotated[
+        bool,
+        typer.Option(
+            "--update-baseline",
+            help="Record the present axes, margins and findings in the --baseline file, and drop records without "
+            "a profile. Findings that are recorded count no more. Exits 0 when it is written.",
+        ),
+    ] = False
+    pass_on_unmatched: Annotated[
+        bool,
+        typer.Option(
+            "--pass-on-unmatched",
+            help="Let profiles without a record in the --baseline file pass, and records without a profile; "
+            "without it they exit 2.",
+        ),
+    ] = False
+
+    def path(self, option_of: "_OptionOf", changes: KeyChanges) -> Path | None:
+        """The file, that of the settings included; None without a baseline."""
+        path: Path | None = option_of("baseline", self.baseline, None)
+        of_baseline = {"--update-baseline": self.update_baseline, "--pass-on-unmatched": self.pass_on_unmatched}
+        require_company("--baseline FILE", of_baseline, is_given=path)
+        if self.update_baseline and self.pass_on_unmatched:
+            raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
+        if self.update_baseline and changes.entries:
+            raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
+        if self.update_baseline and path is not None:
+            require_changeable(path)
+        return path
+
+
+@dataclass(frozen=True)
+class _Recording:
+    """Recording of the machine."""
+
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Recording of the machine of the one profile, as `busplan measured` takes it: what is outside "
+            "the plan fails the check.  [default: none]",
+        ),
+    ] = None
+    quantile: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE",
+            help="Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1].  [default: 1]",
+            show_default=False,
+        ),
+    ] = 1.0
+
+    def __post_init__(self) -> None:
+        require_company("--recording FILE", {"--quantile": self.quantile != 1}, is_given=self.recording)
+
+
+@dataclass(frozen=True)
+class _Written:
+    """Report."""
+
+    format_: Annotated[
+        FormatName | None,
+        typer.Option(
+            "--format",
+            metavar="FORM",
+            help="Form of the report: concise is one line for each finding, full shows the line of the file with the "
+            f"value underlined, json is one document; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} "
+            "are for build services.  [default: full on a terminal, otherwise concise]",
+            envvar="BUSPLAN_FORMAT",
+        ),
+    ] = None
+    output: Annotated[Path | None, output_option("Write the report to FILE")] = None
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on standard error.")] = False
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also name files without findings and skipped files.")
+    ] = False
+
+
+@command(
     "It holds for all files, each of which must be valid without it; a finding is at the key in the file, or at its "
-    "section."
+    "section.",
+    of="profiles",
+    answers=False,
 )
 def check_command(
+    call: Call,
     paths: Annotated[
         list[str],
         typer.Argument(
@@ -66,35 +217,21 @@ def check_command(
             show_default=False,
         ),
     ],
-    changes: KeyChanges = NO_CHANGES,
-    format_: Annotated[
-        FormatName | None,
-        option(
-            "--format FORM",
-            "Form of the report: concise is one line for each finding, full shows the line of the file with the value "
-            f"underlined, json is one document; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for "
-            "build services.  [default: full on a terminal, otherwise concise]",
-            envvar="BUSPLAN_FORMAT",
-        ),
+    selection: _Selection,
+    circle: _Circle,
+    baseline: _Baseline,
+    recording: _Recording,
+    written: _Written,
+    skip_others: Annotated[
+        bool, typer.Option("--skip-others", help="Skip named files without a `schema_version`, and count them.")
+    ] = False,
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.  [default: 1]"),
     ] = None,
-    output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
-    select: str | None = None,
-    ignore: str | None = None,
-    show_suppressed: bool = False,
-    fail_on: Literal["error", "warning"] | None = None,
-    exit_zero: bool = False,
-    circle: bool | None = None,
-    circle_steps: Annotated[int | None, typer.Option(min=1)] = None,
-    baseline: Path | None = None,
-    update_baseline: bool = False,
-    pass_on_unmatched: bool = False,
-    recording: Path | None = None,
-    quantile: float = 1.0,
-    skip_others: bool = False,
-    jobs: Annotated[int | None, typer.Option(min=1)] = None,
-    stdin_filename: str = "<stdin>",
-    quiet: bool = False,
-    verbose: bool = False,
+    stdin_filename: Annotated[
+        str, typer.Option(metavar="NAME", help="Name of standard input in the report.")
+    ] = "<stdin>",
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
@@ -105,117 +242,59 @@ def check_command(
     the job, as with a missing file; the other files are still checked.
 
     Example: busplan check paper-1ms paper-4ms --format github
-
-    Parameters
-    ----------
-    --select CODES
-        Rules that count, as BP1,BP301: beginnings of codes. [default: all]
-    --ignore CODES
-        Rules that do not count, as BP112; the longest beginning decides. [default: none]
-    --show-suppressed
-        Also name suppressed findings, each with its reason.
-    --fail-on
-        Least severity that fails the check. [default: error]
-    --exit-zero
-        Exit 0 even with findings; 2 stays 2.
-    --circle/--no-circle
-        Run the circle test of profiles that ask for one, or leave it out. [default: run it]
-    --circle-steps N
-        Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of it. [default:
-        10000000]
-    --baseline FILE
-        File with recorded axes and margins, which no profile may lose. [default: none]
-    --update-baseline
-        Record the present axes, margins and findings in the --baseline file, and drop records without a profile.
-        Findings that are recorded count no more. Exits 0 when it is written.
-    --pass-on-unmatched
-        Let profiles without a record in the --baseline file pass, and records without a profile; without it they exit
-        2.
-    --recording FILE
-        Recording of the machine of the one profile, as `busplan measured` takes it: what is outside the plan fails the
-        check. [default: none]
-    --quantile SHARE
-        Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1]. [default: 1]
-    --skip-others
-        Skip named files without a `schema_version`, and count them.
-    --jobs,-j N
-        Number of processes to check with. [default: 1]
-    --stdin-filename NAME
-        Name of standard input in the report. [default: <stdin>]
-    --quiet,-q
-        No summary on standard error.
-    --verbose,-v
-        Also name files without findings and skipped files.
     """
     from busplan.gate.selection import nearest_settings
-
-    option_of = nearest_settings(Path.cwd()).option
-    circle, fail_on = option_of("circle", circle, True), option_of("fail-on", fail_on, "error")
-    require_company("--circle", {"--circle-steps": circle_steps}, is_given=circle)
-    circle_steps = option_of("circle-steps", circle_steps, None) if circle else None
-    baseline = option_of("baseline", baseline, None)
-    skip_others = option_of("skip-others", skip_others or None, False)
-    require_company("--recording FILE", {"--quantile": quantile != 1}, is_given=recording)
-    of_baseline = {"--update-baseline": update_baseline, "--pass-on-unmatched": pass_on_unmatched}
-    require_company("--baseline FILE", of_baseline, is_given=baseline)
-    if update_baseline and pass_on_unmatched:
-        raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
-    if update_baseline and changes.entries:
-        raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
-    updated = baseline if update_baseline else None
-    if updated is not None:
-        require_changeable(updated)
-    from busplan.gate.check import check
     from busplan.profile.sources import collect
 
+    option_of = nearest_settings(Path.cwd()).option
+    skip_others = option_of("skip-others", skip_others or None, False)
+    arguments = {**selection.arguments(option_of), **circle.arguments(option_of)}
+    known, least = baseline.path(option_of, call.changes), selection.least(option_of)
+    updated = known if baseline.update_baseline else None
     collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
     read = [source.path for source in collection.sources if source.failure is None]
-    read += [path for path in (recording, baseline) if path is not None and path != updated]
-    require_apart({"--output": output, "--baseline": updated}, inputs=read)
-    recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
+    read += [path for path in (recording.recording, known) if path is not None and path != updated]
+    require_apart({"--output": written.output, "--baseline": updated}, inputs=read)
+    recorded = None if known is None else _read_baseline(known, needed=updated is None)
     with _crew(min(option_of("jobs", jobs, 1), len(collection.sources))) as crew:
-        report = check(
+        report = busplan.check(
             collection,
-            circle=circle,
-            changes=changes,
-            baseline=None if update_baseline else recorded,
-            pass_on_unmatched=pass_on_unmatched,
-            record=update_baseline,
-            recording=recording,
-            quantile=quantile,
+            changes=call.changes,
+            baseline=None if updated else recorded,
+            pass_on_unmatched=baseline.pass_on_unmatched,
+            record=baseline.update_baseline,
+            recording=recording.recording,
+            quantile=recording.quantile,
             skip_others=skip_others,
-            select=option_of("select", _codes(select), ()),
-            ignore=option_of("ignore", _codes(ignore), ()),
-            per_file_ignores=option_of("per-file-ignores", None, {}),
             executor=crew,
-            **({} if circle_steps is None else {"circle_steps": circle_steps}),
+            **arguments,
         )
-    report = report._replace(lists_all=verbose)
-    _write(report, format_=format_, output=output)
-    say(*(file.failure for file in report.files if file.failure is not None))
-    if pass_on_unmatched and report.unmatched:
+    _write(report._replace(lists_all=written.verbose), written)
+    _say_findings(report, collection, written, selection)
+    if baseline.pass_on_unmatched and report.unmatched:
         say(f"warning: {report.unmatched}")
-    if verbose:
-        say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
-        say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
-        say(*(f"{file.path}: rests on {words}" for file in report.files if (words := file.rests_on_words)))
-    say(*(line for file in report.files for line in _suppressed_lines(file) if show_suppressed))
     if updated is not None:
-        _update_baseline(updated, collection.sources, report, quiet=quiet)
-    if not quiet:
+        _update_baseline(updated, collection.sources, report, quiet=written.quiet)
+    if not written.quiet:
         from busplan.forms.numbers import sentence_text
         from busplan.questions.base.sentences import changes_sentences
 
-        say(*map(sentence_text, changes_sentences(changes)), *_mended(report), report.headline)
-    _exit(report, least=None if exit_zero or update_baseline else fail_on)
-
-
-def _exit(report: "CheckReport", *, least: "Severity | None") -> None:
-    """Exit with the code of the check; None for one that no finding fails."""
+        say(*map(sentence_text, changes_sentences(call.changes)), *_mended(report), report.headline)
     if report.failed:
         raise typer.Exit(2)
-    if least is not None and report.has_findings(least):
+    if least is not None and updated is None and report.has_findings(least):
         raise PlanFailsError
+
+
+def _say_findings(report: "CheckReport", collection: "Collection", written: _Written, selection: _Selection) -> None:
+    """Say what could not be checked, and what --verbose and --show-suppressed add."""
+    say(*(file.failure for file in report.files if file.failure is not None))
+    if written.verbose:
+        say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
+        say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
+        say(*(f"{file.path}: rests on {words}" for file in report.files if (words := file.rests_on_words)))
+    if selection.show_suppressed:
+        say(*(line for file in report.files for line in _suppressed_lines(file)))
 
 
 def _codes(text: str | None) -> list[str] | None:
@@ -280,9 +359,10 @@ def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "Ch
         say(f"warning: {path}: dropped {', '.join(left)}, recorded by other timing models; check them, too")
 
 
-def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
+def _write(report: "CheckReport", written: _Written) -> None:
     """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
-    chosen = FORMATS[format_ or ("full" if output is None and sys.stdout.isatty() else "concise")]
+    output = written.output
+    chosen = FORMATS[written.format_ or ("full" if output is None and sys.stdout.isatty() else "concise")]
     if output is not None:
         write_file(output, document_bytes(chosen.write(report)), overwrite=True)
     elif chosen.reader != "people":
@@ -294,18 +374,31 @@ def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -
         say(*FORMATS["concise"].write(report).splitlines())
 
 
-@takes_changes("It holds for both profiles.")
+@command("It holds for both profiles.", of="profiles", reads=lambda a, b, **_: profile_files(a, b))
 def diff_command(
-    a: Annotated[str, typer.Argument(autocompletion=complete_profile)],
-    b: Annotated[str, typer.Argument(autocompletion=complete_profile)],
-    changes: KeyChanges = NO_CHANGES,
+    call: Call,
+    a: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=complete_profile,
+            help="The profile to compare with: a file, a shipped name, - for standard input, or REV:path for a "
+            "file as it stood in a git revision, as HEAD~1:profiles/line.toml; the path starts at the "
+            "current folder.",
+        ),
+    ],
+    b: Annotated[str, typer.Argument(autocompletion=complete_profile, help="The profile to judge, likewise.")],
     timing_model: TimingModelOption = "both",
-    fail_on_regression: bool = False,
-    tolerance: float | None = None,
-    all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-) -> None:
+    fail_on_regression: Annotated[
+        bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
+    ] = False,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PERCENT",
+            help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
+        ),
+    ] = None,
+) -> "Answer | Fails":
     """Tell what changed between two profiles, and what that does to every figure.
 
     A sentence has both verdicts and says in what B is better or worse. Below it stand the keys whose values differ,
@@ -316,33 +409,16 @@ def diff_command(
     never the verdict. Which key cost what is told by check, against its baseline.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
-
-    Parameters
-    ----------
-    A
-        The profile to compare with: a file, a shipped name, - for standard input, or REV:path for a file as it stood in
-        a git revision, as HEAD~1:profiles/line.toml; the path starts at the current folder.
-    B
-        The profile to judge, likewise.
-    --fail-on-regression
-        Exit 1 when a figure of B is worse.
-    --tolerance PERCENT
-        With --fail-on-regression, how much worse a number may be than A's [%]. [default: 0]
     """
     require_company("--fail-on-regression", {"--tolerance": tolerance is not None}, is_given=fail_on_regression)
     if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0):
         raise BusplanError(f"--tolerance {tolerance:g}: must be 0 or more, in percent")
-    with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
-        from busplan.profile.sources import load_revision
-        from busplan.questions.diff import diff
+    from busplan.profile.sources import load_revision
 
-        first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
-        difference = diff(first, second, timing_model=chosen_model(timing_model), arguments=(a, b))
-        give(difference)
-        regressions = difference.regression_words(tolerance_percent=tolerance or 0.0)
-    if fail_on_regression and regressions:
-        say(regressions)
-        raise PlanFailsError
+    first, second = load_each((a, b), lambda argument: call.changes.applied(load_revision(argument).profile))
+    difference = busplan.diff(first, second, timing_model=chosen_model(timing_model), arguments=(a, b))
+    regressions = difference.regression_words(tolerance_percent=tolerance or 0.0)
+    return Fails(difference, regressions) if fail_on_regression and regressions else difference
 
 
 def complete_code(incomplete: str) -> list[str]:
@@ -352,29 +428,27 @@ def complete_code(incomplete: str) -> list[str]:
     return [code for code in all_rules() if code.startswith(incomplete)]
 
 
+@command(of="nothing")
 def rule_command(
-    code: Annotated[str | None, typer.Argument(autocompletion=complete_code)] = None,
-    all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-) -> None:
+    code: Annotated[
+        str | None,
+        typer.Argument(
+            autocompletion=complete_code, help="Code or name of a rule, as BP101 or syntax.  [default: all of them]"
+        ),
+    ] = None,
+) -> "Report":
     """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
 
     Without a code it lists all rules with their severity. Exits 0.
 
     Example: busplan rule BP110
-
-    Parameters
-    ----------
-    CODE
-        Code or name of a rule, as BP101 or syntax. [default: all of them]
     """
-    with answer(format_, output, is_whole=all_) as give:
-        from busplan.gate.rules import rule_answer
+    from busplan.gate.rules import rule_answer
 
-        give(rule_answer(code))
+    return rule_answer(code)
 
 
+@command(of="nothing", answers=False)
 def schema_command() -> None:
     """Print the JSON Schema of profiles (draft 2020-12), with every description and unit.
 

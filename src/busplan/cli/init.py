@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 import typer
 
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
-from busplan.cli.options import complete_profile, option, time_us
+from busplan.cli.command import command
+from busplan.cli.options import complete_profile, time_us
 from busplan.cli.output import message_width, say
 from busplan.english import listed
 from busplan.errors import BusplanError
@@ -29,33 +30,68 @@ _GROUP: Final = re.compile(
 )
 
 
+@command(of="nothing", answers=False)
 def init_command(
-    name: Annotated[str, typer.Argument()] = "my-machine",
+    name: Annotated[
+        str,
+        typer.Argument(help="Name of the new profile, or the path of its file; .toml is added where it is missing."),
+    ] = "my-machine",
     bus: Annotated[
         str | None,
-        option(
-            "--bus KIND",
-            f"Kind of bus: {', '.join(kind_names())}, or another name, as firewire, can-fd, profibus or dynamixel.  "
-            f"[default: {_KIND}]",
+        typer.Option(
+            "--bus",
+            metavar="KIND",
+            help=f"Kind of bus: {', '.join(kind_names())}, or another name, as firewire, can-fd, profibus or "
+            f"dynamixel.  [default: {_KIND}]",
             autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,
-    nodes: Annotated[int | None, typer.Option(min=1)] = None,
-    axes: Annotated[int | None, typer.Option(min=1)] = None,
-    group: list[str] | None = None,
-    period: str | None = None,
-    bytes_per_axis: Annotated[int | None, typer.Option(min=1)] = None,
-    host: str | None = None,
-    bit_rate: Annotated[int | None, typer.Option(min=1)] = None,
+    nodes: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]")
+    ] = None,
+    axes: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node]")
+    ] = None,
+    group: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME:NODESxAXES[:READ/WRITE]",
+            help="Nodes of the same kind: the axes of one node and, if not by --bytes-per-axis, the bytes that "
+            "it sends and receives; repeated, instead of --nodes and --axes.  [default: one group]",
+        ),
+    ] = None,
+    period: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="Communication period with its unit, as 1ms or 500us.  [default: a usual one of the bus]",
+        ),
+    ] = None,
+    bytes_per_axis: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Payload of each axis, in either direction [bytes].  [default: 8]"),
+    ] = None,
+    host: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST",
+            help="Host of an EtherCAT bus, from which its own time is assumed: hardware, tuned, real-time or "
+            "stock; other kinds have no choice of hosts.  [default: tuned]",
+        ),
+    ] = None,
+    bit_rate: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Bit rate of CAN [kbit/s].  [default: 1000, assumed]")
+    ] = None,
     source: Annotated[
         str | None,
-        option(
-            "--from SHIPPED",
-            "Copy a shipped profile instead, with its comments (see `busplan profiles`).  [default: no copy]",
+        typer.Option(
+            "--from",
+            metavar="SHIPPED",
+            help="Copy a shipped profile instead, with its comments (see `busplan profiles`).  [default: no copy]",
             autocompletion=complete_profile,
         ),
     ] = None,
-    force: bool = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is already there.")] = False,
 ) -> None:
     """Write a commented profile of your machine, and say whether it fits.
 
@@ -68,29 +104,6 @@ def init_command(
     axes, which send 32 bytes and receive 8.
 
     Example: busplan init gantry --nodes 6 --axes 24 --period 1ms
-
-    Parameters
-    ----------
-    NAME
-        Name of the new profile, or the path of its file; .toml is added where it is missing. [default: my-machine]
-    --nodes N
-        Nodes of the machine, the host not counted. [default: 4]
-    --axes N
-        Axes of the whole machine. [default: 4 for each node]
-    --group NAME:NODESxAXES[:READ/WRITE]
-        Nodes of the same kind: the axes of one node and, if not by --bytes-per-axis, the bytes that it sends and
-        receives; repeated, instead of --nodes and --axes. [default: one group]
-    --period TIME
-        Communication period with its unit, as 1ms or 500us. [default: a usual one of the bus]
-    --bytes-per-axis N
-        Payload of each axis, in either direction [bytes]. [default: 8]
-    --host HOST
-        Host of an EtherCAT bus, from which its own time is assumed: hardware, tuned, real-time or stock; other kinds
-        have no choice of hosts. [default: tuned]
-    --bit-rate N
-        Bit rate of CAN [kbit/s]. [default: 1000, assumed]
-    --force
-        Overwrite a file that is already there.
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if not path.name.removesuffix(".toml").strip("."):

@@ -1,22 +1,16 @@
 """Commands that are loaded when they are called, and the layout of their help: plain names, and exit codes."""
 
-import os
-import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
-from copy import copy
-from functools import wraps
+import sys
+from collections.abc import Mapping
 from importlib import import_module
-from inspect import Parameter, cleandoc, signature
 from types import MappingProxyType
-from typing import Annotated, Any, Final, get_args, get_origin
+from typing import Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
 from typer.main import get_command
 
-from busplan.cli.output import PAGER
 from busplan.errors import BusplanError
 
 FAILURES: Final = (
@@ -28,21 +22,38 @@ _OFFER: Final = 60
 """Most characters of help for a completion in the shell."""
 
 
-@contextmanager
-def _usage_in_our_form(command: str, *, takes_set: bool = False) -> Iterator[None]:
-    """Raise errors of the option parser as the program's own, on one line."""
-    try:
-        yield
-    except TyperException as error:
-        words = error.format_message().rstrip(".").replace("Value error, ", "").replace("Input should", "must")
-        unknown = re.search(r"option: --([a-z-]+)", words) if takes_set else None
+_WRONG: Final = MappingProxyType(
+    {
+        "int_parsing": "expected a whole number",
+        "float_parsing": "expected a number",
+        "greater_than_equal": "must be {ge:,} or more",
+        "less_than_equal": "must be {le:,} or less",
+    }
+)
+"""What is said of a value that typer refuses, by pydantic's type of error."""
+
+
+def _in_words(error: Any) -> str:
+    """An error of typer as the program's own, on one line: the option as typed, and what would be right."""
+    from busplan.english import listed
+
+    command = error.ctx.command_path if getattr(error, "ctx", None) else "busplan"
+    words, hint = error.format_message().rstrip("."), f"`{command} --help` says more"
+    if hasattr(error.__cause__, "errors"):  # a value that pydantic refused
+        (refused, *_), param = error.__cause__.errors(), error.param
+        choices = param.type_descriptor.choices
+        if choices:
+            right = f"expected {listed(choices, 'or')}"
+        else:
+            right = _WRONG.get(refused["type"], "{msg}").format(**{**refused, **refused.get("ctx", {})})
+        return f"{max(param.opts, key=len)} {refused['input']}: {right}; {hint}"
+    if hasattr(error, "possibilities") and any("--set" in param.opts for param in error.cmd.params):
         # The beginning of an option of the command is more likely meant as that option.
-        is_begun = unknown is not None and f" --{unknown[1]}-" in words
-        key = _key_named(unknown[1].replace("-", "_")) if unknown and not is_begun else None
-        hint = f"`{command} --help` says more"
+        is_begun = any(option.startswith(f"{error.option_name}-") for option in error.possibilities or ())
+        key = None if is_begun else _key_named(error.option_name.lstrip("-").replace("-", "_"))
         if key:
             words, hint = words.partition(" (")[0], f"--set {key}=... changes it for this run"
-        raise BusplanError(f"{command}: {words[:1].lower()}{words[1:]}; {hint}") from None
+    return f"{command}: {words[:1].lower()}{words[1:]}; {hint}"
 
 
 def _key_named(name: str) -> str | None:
@@ -59,14 +70,17 @@ class PlainCommand(TyperCommand):
 
     def __init__(self, name: str | None, **settings: Any) -> None:
         super().__init__(name, **settings)
-        for param in _of_kind(self.params, "argument"):
-            param.metavar = param.metavar or param.name.upper()
+        for param in self.params:
+            if param.param_type_name == "argument":
+                param.metavar = param.metavar or param.name.upper()
 
-    def make_context(self, info_name: str | None, *arguments: Any, **settings: Any) -> Any:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the command line of the command."""
-        takes_set = any("--set" in param.opts for param in self.params)
-        with _usage_in_our_form(f"busplan {info_name}", takes_set=takes_set):
-            return super().make_context(info_name, *arguments, **settings)
+        try:
+            return super().parse_args(ctx, args)
+        except TyperException as error:
+            error.__dict__.update(ctx=ctx, cmd=self)  # some have none
+            raise
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Pieces of the usage line, without typer's braces around required arguments."""
@@ -81,13 +95,19 @@ class PlainCommand(TyperCommand):
         _write_parameters(self, ctx, formatter)
 
 
-def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: Any) -> None:
-    for kind in ("argument", "option"):
-        records = (param.get_help_record(ctx) for param in _of_kind(command.get_params(ctx), kind))
-        # Typer adds a Python type to an argument.
-        rows = [(row[0].partition(" <")[0] if kind == "argument" else row[0], row[1]) for row in records if row]
+def _write_parameters(command: Any, ctx: Any, formatter: Any) -> None:
+    """Write arguments and options, each record of options below its title."""
+    sections: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
+    for param in command.get_params(ctx):
+        names, words = param.get_help_record(ctx)
+        if param.param_type_name == "argument":
+            # Typer adds a Python type.
+            sections["Arguments"].append((names.partition(" <")[0], words))
+        else:
+            sections.setdefault(param.rich_help_panel or "Options", []).append((names, words))
+    for title, rows in sections.items():
         if rows:
-            with formatter.section(f"{kind.capitalize()}s"):
+            with formatter.section(title):
                 formatter.write_dl(rows)
 
 
@@ -98,10 +118,6 @@ def _on_one_line(completions: list[Any]) -> list[Any]:
     for completion in completions:
         completion.help = completion.help and shorten(completion.help, _OFFER, placeholder="...")
     return completions
-
-
-def _of_kind(params: list[Any], kind: str) -> list[Any]:
-    return [param for param in params if param.param_type_name == kind]
 
 
 SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -123,54 +139,6 @@ _MODULES: Final = {
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
-def _declared(command: Callable[..., None]) -> Callable[..., None]:
-    """Give parameters of a command the usage and the help that the section Parameters of its docstring has.
-
-    An entry is an option as the help shows it, `--output,-o FILE`, or the name of an argument in capitals. Parameters
-    without an entry keep what they are annotated with.
-    """
-    words, _, listed = cleandoc(command.__doc__ or "").partition("\n\nParameters\n----------\n")
-    written = signature(command)
-    parameters = dict(written.parameters)
-    for usage, lines in re.findall(r"^(\S.*)\n((?: .*\n?)+)", listed, re.MULTILINE):
-        names, _, value = usage.partition(" ")
-        name = re.split("[,/]", names.lstrip("-"))[0].replace("-", "_").lower()
-        name = name if name in parameters else f"{name}_"
-        annotation, default = parameters[name].annotation, typer.Option() if names.startswith("-") else typer.Argument()
-        kind, info = get_args(annotation) if get_origin(annotation) is Annotated else (annotation, default)
-        info = copy(info)
-        info.help, info.show_default = " ".join(lines.split()).replace(" [default: ", "  [default: "), False
-        if names.startswith("-"):
-            info.param_decls, info.metavar = names.split(","), value or None
-        parameters[name] = parameters[name].replace(annotation=Annotated[kind, info])
-    # Typer reads the signature, and the annotations beside it.
-    command.__signature__ = written.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]
-    command.__annotations__ = {name: parameter.annotation for name, parameter in parameters.items()}
-    command.__doc__ = words
-    return command
-
-
-NoPagerOption = Annotated[
-    bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is longer than the terminal.")
-]
-
-
-def _with_pager_option(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the option `--no-pager`, which also stands before it."""
-
-    @wraps(command)
-    def run(*, no_pager: bool, **values: Any) -> None:
-        if no_pager:
-            os.environ[PAGER] = ""
-        command(**values)
-
-    written = signature(command)
-    last = Parameter("no_pager", Parameter.KEYWORD_ONLY, default=False, annotation=NoPagerOption)
-    run.__signature__ = written.replace(parameters=[*written.parameters.values(), last])  # type: ignore[attr-defined]
-    run.__annotations__ = {**command.__annotations__, "no_pager": NoPagerOption}
-    return run
-
-
 class LazyGroup(TyperGroup):
     """The program's group of commands, each loaded at its first use; its help lists them first."""
 
@@ -183,7 +151,7 @@ class LazyGroup(TyperGroup):
             single = typer.Typer(
                 add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=SETTINGS
             )
-            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(_with_pager_option(_declared(command)))
+            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(command)
             self.commands[cmd_name] = get_command(single)
         return self.commands.get(cmd_name)
 
@@ -200,15 +168,14 @@ class LazyGroup(TyperGroup):
             raise BusplanError(f"{args[0]}: no such command; {near}")
         return super().resolve_command(ctx, args)
 
-    def make_context(self, info_name: str | None, args: list[str], *arguments: Any, **settings: Any) -> Any:
-        """Parse the options before the command; without any word typer shows the help."""
-        with _usage_in_our_form("busplan") if args else nullcontext():
-            return super().make_context(info_name, args, *arguments, **settings)
-
-    def invoke(self, ctx: Any) -> Any:
-        """Parse the command line of a command and run it."""
-        with _usage_in_our_form("busplan"):
-            return super().invoke(ctx)
+    def main(self, args: Any = None, *arguments: Any, **settings: Any) -> Any:
+        """Run the program and return its exit code; without any word typer shows the help."""
+        if not (sys.argv[1:] if args is None else args):
+            return super().main(args, *arguments, **settings)
+        try:
+            return super().main(args, *arguments, **{**settings, "standalone_mode": False})
+        except TyperException as error:
+            raise BusplanError(_in_words(error)) from None
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """Complete commands and options."""

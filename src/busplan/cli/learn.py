@@ -6,14 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from busplan.cli.answering import answer, require_apart
-from busplan.cli.options import AllOption, FormatOption, OutputOption, output_option
+import busplan
+from busplan.cli.answering import require_apart
+from busplan.cli.command import command
+from busplan.cli.options import output_option
 from busplan.cli.output import emit_document, emit_pages, progress_bar, say
 from busplan.errors import BusplanError
 from busplan.files import write_file
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
+    from busplan.questions.base.answer import Answer
     from busplan.sections.profile import Profile
 
 
@@ -24,8 +27,14 @@ def complete_topic(incomplete: str) -> list[str]:
     return [topic for topic in topics() if topic.startswith(incomplete)]
 
 
+@command(of="nothing", answers=False)
 def manual_command(
-    topic: Annotated[str | None, typer.Argument(autocompletion=complete_topic)] = None,
+    topic: Annotated[
+        str | None,
+        typer.Argument(
+            autocompletion=complete_topic, help="Topic of a page, as profile.  [default: a list of all of them]"
+        ),
+    ] = None,
     output: Annotated[Path | None, output_option("Write the page to FILE, always as Markdown")] = None,
 ) -> None:
     """Show a reference page: profile keys, timing models, the circle test, the plan, the gate, JSON, Python, limits.
@@ -34,11 +43,6 @@ def manual_command(
     --help` describes a command and its options. Exits 0 when the page is written.
 
     Example: busplan manual profile
-
-    Parameters
-    ----------
-    TOPIC
-        Topic of a page, as profile. [default: a list of all of them]
     """
     from busplan.manual import page, topics
 
@@ -66,17 +70,17 @@ def manual_command(
         emit_document(text)
 
 
-def profiles_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
+@command(of="nothing")
+def profiles_command() -> "Report":
     """List the shipped profiles, which every command takes by name.
 
     Each has its bus, nodes, axes and period; --all adds the description. Exits 0.
 
     Example: busplan profiles
     """
-    with answer(format_, output, is_whole=all_) as give:
-        from busplan.profile.sources import load, shipped_names
+    from busplan.profile.sources import load, shipped_names
 
-        give(_profiles_report([load(name).profile for name in shipped_names()]))
+    return _profiles_report([load(name).profile for name in shipped_names()])
 
 
 def _profiles_report(profiles: "list[Profile]") -> "Report":
@@ -115,12 +119,13 @@ def complete_kind(incomplete: str) -> list[str]:
     return [name for name in kind_names() if name.startswith(incomplete)]
 
 
+@command(of="nothing")
 def evidence_command(
-    kind: Annotated[str | None, typer.Argument(autocompletion=complete_kind)] = None,
-    all_: AllOption = False,
-    format_: FormatOption = None,
-    output: OutputOption = None,
-) -> None:
+    kind: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_kind, help="Kind of bus, as ieee1394.  [default: all of them]"),
+    ] = None,
+) -> "Answer":
     """Compare published and measured figures of a kind of bus with the computed ones.
 
     Each figure has its grade, the way it is computed, and the residual, computed less published, also in percent. A
@@ -128,21 +133,13 @@ def evidence_command(
     with any residuals.
 
     Example: busplan evidence ieee1394
-
-    Parameters
-    ----------
-    KIND
-        Kind of bus, as ieee1394. [default: all of them]
     """
-    with answer(format_, output, is_whole=all_) as give:
-        from busplan.questions.evidence import evidence
-
-        with progress_bar("circle tests") as progress:
-            compared = evidence(kind, progress=progress)
-        give(compared)
+    with progress_bar("circle tests") as progress:
+        return busplan.evidence(kind, progress=progress)
 
 
-def paper_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
+@command(of="nothing")
+def paper_command() -> "Answer":
     """Compare every figure of the paper that the equations give with the computed one.
 
     The figures are those of Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of
@@ -152,9 +149,5 @@ def paper_command(all_: AllOption = False, format_: FormatOption = None, output:
 
     Example: busplan paper --format csv
     """
-    with answer(format_, output, is_whole=all_) as give:
-        from busplan.questions.evidence import evidence
-
-        with progress_bar("circle tests") as progress:
-            compared = evidence(paper=True, progress=progress)
-        give(compared)
+    with progress_bar("circle tests") as progress:
+        return busplan.evidence(paper=True, progress=progress)

@@ -1,25 +1,17 @@
 """Arguments and options of several commands, and parsers of their values."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
-from inspect import Parameter, signature
-from itertools import product
+from collections.abc import Mapping
 from math import isinf
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import typer
 
 from busplan.errors import BusplanError
-from busplan.extras import require_resvg
 from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
-from busplan.profile.changes import SET, KeyChange, KeyChanges, in_unit, parse_set, require_separate
-
-if TYPE_CHECKING:
-    from busplan.sections.profile import Profile
-
+from busplan.profile.changes import in_unit
 
 AnyForm = TypeVar("AnyForm", bound=str)
 
@@ -98,35 +90,18 @@ def chosen_model(timing_model: str | None) -> str | None:
     return None if timing_model == ALL_MODELS else timing_model
 
 
-def option(usage: str, words: str, **settings: Any) -> Any:
-    """Make an option whose help states the default: in the code it is None, or False.
-
-    Parameters
-    ----------
-    usage
-        Names and value as in the help: "--output,-o FILE".
-    words
-        Text of its help, with the default in brackets at the end.
-    settings
-        Further settings of typer's option.
-    """
-    names, _, value = usage.partition(" ")
-    return typer.Option(*names.split(","), metavar=value or None, help=words, **{"show_default": False, **settings})
-
-
 STANDARD_OUTPUT: Final = Path("-")
 
 
 def output_option(words: str) -> Any:
-    """Make the option --output.
-
-    Parameters
-    ----------
-    words
-        Beginning of its help: what is written where.
-    """
-    help_ = f"{words}; an old file is replaced; - is standard output.  [default: standard output]"
-    return option("--output,-o FILE", help_, parser=_file_unless_dash)
+    """The option --output, by the beginning of its help: what is written where."""
+    return typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help=f"{words}; an old file is replaced; - is standard output.  [default: standard output]",
+        parser=_file_unless_dash,
+    )
 
 
 def _file_unless_dash(text: str) -> Path | None:
@@ -134,23 +109,29 @@ def _file_unless_dash(text: str) -> Path | None:
 
 
 def format_option(default: str, *, more: str = "") -> Any:
-    """Make the option --format.
-
-    Parameters
-    ----------
-    default
-        The form without --format and --output.
-    more
-        What its help says of further forms.
-    """
-    help_ = f"Form of the answer; a table is plain text.{more}  [default: by the ending of --output, else {default}]"
-    return option("--format", help_)
+    """The option --format, by the form without --format and --output, and what its help says of further forms."""
+    return typer.Option(
+        "--format",
+        help=f"Form of the answer; a table is plain text.{more}  [default: by the ending of --output, else {default}]",
+    )
 
 
-AllOption = Annotated[bool, option("--all", "Show everything: every row, and every column on a narrow terminal, too.")]
+AllOption = Annotated[
+    bool, typer.Option("--all", help="Show everything: every row, and every column on a narrow terminal, too.")
+]
+NoPagerOption = Annotated[
+    bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is longer than the terminal.")
+]
 FormatOption = Annotated[Form | None, format_option("table")]
 JobsOption = Annotated[
-    int | None, option("--jobs,-j N", "Number of processes for --circle.  [default: one for each processor]", min=1)
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        metavar="N",
+        min=1,
+        help="Number of processes for --circle.  [default: one for each processor]",
+    ),
 ]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
 DrawnForm = Literal[Form, Picture]
@@ -180,20 +161,9 @@ def form_of_file(
     return chosen
 
 
-def plot_form(path: Path) -> Picture:
-    """Form of the picture of --plot, by the ending of its name.
-
-    Raises
-    ------
-    BusplanError
-        The ending is not known, or the form is png and resvg-py is missing.
-    """
-    ending = path.suffix.lower()
-    if ending not in PICTURES:
-        raise BusplanError(f"--plot {path}: {ending_expected(ending, PICTURES)}")
-    if ending == ".png":
-        require_resvg("--plot")
-    return PICTURES[ending]
+def form_typed(form: str | None, output: Path | None) -> str:
+    """The option that chose a form, as typed."""
+    return f"--output {output}" if form is None else f"--format {form}"
 
 
 def require_company(company: str, options: Mapping[str, object], *, is_given: object) -> None:
@@ -262,150 +232,3 @@ def parse_axis(text: str, *, option: str) -> tuple[str, str]:
     if not equals or not key or not values:
         raise BusplanError(f"{option} {text}: expected KEY=VALUES, as bus.nodes=1:62 or cycle.period_us=250,500,1000")
     return key, values
-
-
-_PERIOD: Final = "cycle.period_us"
-PeriodsOption = Annotated[
-    list[str] | None,
-    option(
-        "--period TIME[,TIME...]",
-        "Communication period with its unit, as 4ms, 250us or 0.001s, or several with commas.  [default: the "
-        "profile's cycle.period_us]",
-    ),
-]
-_TakenPeriod = Annotated[
-    str | None,
-    option(
-        "--period TIME",
-        "Communication period with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    ),
-]
-
-
-def _period_change(text: str) -> KeyChange:
-    period_us = time_us(text, option="--period")
-    return KeyChange(_PERIOD, period_us, "--period", text, f", in us {period_us}")
-
-
-def _set_option(words: str) -> Any:
-    usage = (
-        "Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
-        "node.execution.time_us=[30,40]. VALUE is TOML, a number in the unit of its key or with one, as 250us; it is "
-        "checked like the file; a table replaces the whole section. May be given several times."
-        f"{words and ' '}{words}  [default: the profile as it is]"
-    )
-    return Annotated[list[str] | None, option(f"{SET} KEY=VALUE", usage)]
-
-
-def takes_changes(words: str = "", *, period: bool = False) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Replace the parameter `changes` of a command by --set, and by --period where that sets the profile's period.
-
-    Parameters
-    ----------
-    words
-        End of the help of --set: what is special here.
-    period
-        Whether --period sets the profile's period; a command may have its own, for several.
-    """
-    options = {**({"period": _TakenPeriod} if period else {}), "set_": _set_option(words)}
-
-    def replaced(command: Callable[..., None]) -> Callable[..., None]:
-        written = signature(command)
-        parameters: list[Parameter] = []
-        for parameter in written.parameters.values():
-            if parameter.name == "changes":
-                for name, annotation in options.items():
-                    parameters.append(Parameter(name, parameter.kind, default=None, annotation=annotation))
-            else:
-                parameters.append(parameter)
-
-        @wraps(command)
-        def with_changes(*arguments: Any, set_: list[str] | None, **given: Any) -> None:
-            text = given.pop("period") if period else None
-            made = () if text is None else (_period_change(text),)
-            changes = KeyChanges((*made, *parse_set(set_ or ())))
-            # Periods to compute, such as 4ms, beside a change of the period.
-            for computed, change in product(given.get("period") or (), changes.entries):
-                if change.key == _PERIOD:
-                    require_separate(change, _PERIOD, typed=f"--period {computed}")
-            from busplan.sourced import constants_changed
-
-            with constants_changed(changes.changed_constants):
-                command(*arguments, changes=changes, **given)
-
-        # Typer reads the options of a command from its signature; without it every command would list these two.
-        with_changes.__signature__ = written.replace(parameters=parameters)  # type: ignore[attr-defined]
-        kept = {name: annotation for name, annotation in command.__annotations__.items() if name != "changes"}
-        with_changes.__annotations__ = {**kept, **options}
-        return with_changes
-
-    return replaced
-
-
-def load_changed(argument: str, changes: KeyChanges) -> "Profile":
-    """Read a profile and apply the values of options.
-
-    Raises
-    ------
-    BusplanError
-        Not a profile, or a value that its schema refuses.
-    """
-    from busplan.profile.sources import load
-
-    return changes.applied(load(argument).profile)
-
-
-def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | None:
-    """Parse the values of --period, such as 4ms, 250us or 0.001s [us]; None if it is not given.
-
-    Raises
-    ------
-    BusplanError
-        Not a number with a unit, or out of the profile's range.
-    """
-    if not texts:
-        return None
-    made = [change for text in texts for change in _period_changes(text)]
-    for change in made:
-        KeyChanges((change,)).applied(profile)
-    return [time_us(change.text, option="--period") for change in made]
-
-
-def _period_changes(text: str) -> list[KeyChange]:
-    """A change for each period between commas."""
-    parts = text.split(",")
-    try:
-        return [_period_change(part) for part in parts]
-    except BusplanError:
-        if len(parts) == 1:
-            raise
-        raise BusplanError(f"--period {text}: expected times with their unit between commas, as 500us,1ms") from None
-
-
-def load_each(arguments: Sequence[str], load: "Callable[[str], Profile]") -> "list[Profile]":
-    """Read every profile.
-
-    Parameters
-    ----------
-    arguments
-        PROFILE arguments; standard input may be one of them.
-    load
-        Function that reads one.
-
-    Raises
-    ------
-    BusplanError
-        Standard input more than once; or the problems of all profiles together.
-    """
-    profiles: list[Profile] = []
-    problems: list[str] = []
-    if arguments.count("-") > 1:
-        raise BusplanError("-: standard input can be read once; give files for the others")
-    for argument in arguments:
-        try:
-            profiles.append(load(argument))
-        except BusplanError as error:
-            problems.extend(error.problems)
-    if problems:
-        raise BusplanError(*dict.fromkeys(problems))
-    return profiles

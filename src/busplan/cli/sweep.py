@@ -2,65 +2,113 @@
 
 from collections.abc import Mapping
 from contextlib import nullcontext
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
+import typer
+
 from busplan.cli.answering import profile_files, require_apart, write_report
+from busplan.cli.command import Call, command
 from busplan.cli.options import (
     VALUES_HELP,
     AllOption,
     JobsOption,
-    ProfileArgument,
     TimingModelOption,
     chosen_model,
     form_of_file,
-    load_changed,
-    option,
+    form_typed,
     output_option,
     parse_axes,
     require_company,
-    takes_changes,
 )
 from busplan.cli.output import progress_bar, refuse_terminal, say, write_document
 from busplan.errors import BusplanError
 from busplan.extras import require_pyarrow
 from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, ROWS_ENDINGS, Form, RowsForm
-from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
+from busplan.profile.changes import require_separate
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
     from contextlib import AbstractContextManager
 
     from busplan.questions.sweep import SweepAnswer
-    from busplan.questions.sweep.table import Sweep
 
 SweepForm = Literal[Form, RowsForm]
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 
 
-@takes_changes("A key that varies takes none.")
+@dataclass(frozen=True)
+class _Circle:
+    """Circle tests."""
+
+    circle: Annotated[
+        bool,
+        typer.Option(
+            "--circle", help="Also run the circle test of every point, and add its columns (errors in mm, margins)."
+        ),
+    ] = False
+    jobs: JobsOption = None
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must "
+            "have the same versions of Python, busplan and numpy. Needs the extra cluster "
+            "(distributed).  [default: here]",
+        ),
+    ] = None
+    unlimited: Annotated[
+        bool, typer.Option("--unlimited", help="Run more than 1,000 circle tests, which --circle alone refuses.")
+    ] = False
+
+    def __post_init__(self) -> None:
+        of_circle = {"--jobs": self.jobs, "--cluster": self.cluster, "--unlimited": self.unlimited}
+        require_company("--circle", of_circle, is_given=self.circle)
+        if self.cluster is not None and self.jobs is not None:
+            raise BusplanError(
+                "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
+            )
+
+    def crew(self, *, points: int) -> "AbstractContextManager[Executor | None]":
+        """Where the tests run: in worker processes or on a cluster; None for this process."""
+        if not self.circle:
+            return nullcontext()
+        from busplan.cli.workers import available_processors, dask_executor, executor
+
+        if self.cluster is not None:
+            return dask_executor(self.cluster)
+        return executor(min(self.jobs or available_processors(), points))
+
+
+@command("A key that varies takes none.", answers=False)
 def sweep_command(
-    profile: ProfileArgument,
+    call: Call,
+    circle: _Circle,
     vary: Annotated[
         list[str] | None,
-        option(
-            "--vary KEY=VALUES",
-            f"A numeric key of the profile, and its values in its unit: {VALUES_HELP} Given several times, every "
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help=f"A numeric key of the profile, and its values in its unit: {VALUES_HELP} Given several times, every "
             "combination is computed; the last key changes fastest.  [required]",
         ),
     ] = None,
-    changes: KeyChanges = NO_CHANGES,
     timing_model: TimingModelOption = "both",
-    format_: SweepForm | None = None,
+    format_: Annotated[
+        SweepForm | None,
+        typer.Option(
+            "--format",
+            help="Form of the answer: the first rows as a table (text in lines), markdown or html, or every row "
+            "as csv, json (one document) or parquet (typed columns; needs the extra table, "
+            "pyarrow).  [default: by the ending of --output, else table]",
+        ),
+    ] = None,
     output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
     all_: AllOption = False,
-    circle: bool = False,
-    jobs: JobsOption = None,
-    cluster: str | None = None,
-    unlimited: bool = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
@@ -68,66 +116,34 @@ def sweep_command(
     duckdb, which sort, group and draw it. Ctrl-C, SIGTERM and SIGHUP leave FILE as it was. Exits 0 with any verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 -o nodes.csv
-
-    Parameters
-    ----------
-    --format
-        Form of the answer: the first rows as a table (text in lines), markdown or html, or every row as csv, json (one
-        document) or parquet (typed columns; needs the extra table, pyarrow). [default: by the ending of --output, else
-        table]
-    --circle
-        Also run the circle test of every point, and add its columns (errors in mm, margins).
-    --cluster ADDRESS
-        Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the same
-        versions of Python, busplan and numpy. Needs the extra cluster (distributed). [default: here]
-    --unlimited
-        Run more than 1,000 circle tests, which --circle alone refuses.
     """
     form = form_of_file(format_, output, forms=_ENDINGS, default="table")
-    of_circle = {"--jobs": jobs, "--cluster": cluster, "--unlimited": unlimited}
-    require_company("--circle", of_circle, is_given=circle)
-    if cluster is not None and jobs is not None:
-        raise BusplanError(
-            "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
-        )
     if form == "parquet":
         if output is None:
             refuse_terminal("parquet")
-        require_pyarrow("--format parquet" if format_ else f"--output {output}")
-    require_apart({"--output": output}, inputs=profile_files(profile))
+        require_pyarrow(form_typed(format_, output))
+    require_apart({"--output": output}, inputs=profile_files(call.argument))
     from busplan.questions.base.arguments import load_network
     from busplan.questions.sweep import checked_sweep, computed
 
-    loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
-    for change, key in product(changes.entries, varied):
+    varied, model = parse_axes(vary or []), chosen_model(timing_model)
+    for change, key in product(call.changes.entries, varied):
         require_separate(change, key, typed=f"--vary {key}")
-    model = chosen_model(timing_model)
     sweep = checked_sweep(
-        load_network(loaded),
+        load_network(call.profile),
         varied,
         timing_models=None if model is None else [model],
-        circle=circle,
-        unlimited=unlimited,
-        changes=changes,
+        circle=circle.circle,
+        unlimited=circle.unlimited,
+        changes=call.changes,
     )
     # Opened before the work, so that a path that cannot be written fails at once.
     with new_file(output, overwrite=True) if output else nullcontext() as file:
-        with progress_bar("sweep") as progress, _crew(sweep, jobs=jobs, cluster=cluster) as crew:
+        with progress_bar("sweep") as progress, circle.crew(points=sweep.grid.points) as crew:
             answer = computed(sweep, executor=crew, progress=progress)
         _write(answer, form, file, is_whole=all_)
     if output is not None:
         say(f"wrote {output}")
-
-
-def _crew(sweep: "Sweep", *, jobs: int | None, cluster: str | None) -> "AbstractContextManager[Executor | None]":
-    """Where circle tests run: in worker processes or on a cluster; None for this process."""
-    if not sweep.circle:
-        return nullcontext()
-    from busplan.cli.workers import available_processors, dask_executor, executor
-
-    if cluster is not None:
-        return dask_executor(cluster)
-    return executor(min(jobs or available_processors(), sweep.grid.points))
 
 
 def _write(answer: "SweepAnswer", form: SweepForm, file: NewFile | None, *, is_whole: bool) -> None:
