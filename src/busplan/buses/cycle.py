@@ -390,9 +390,8 @@ def _rounds_us(run: Run, count: int) -> float:
     if not count:
         return 0.0
     events: Iterable[BusEvent] = run.events
-    if (
-        run.laid_out is not None and run.group is not None and len(run.events) > 1
-    ):  # Rounds may differ, so the mean one.
+    # Rounds may differ, so the mean one is taken.
+    if run.laid_out is not None and run.group is not None and len(run.events) > 1:
         events = run.laid_out((count - 1) / 2)
     counts = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
     return sum(counts[event.rounds] * event.us for event in events)

@@ -128,7 +128,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
 
 
 def _with_data(devices: Devices) -> Devices:
-    """Devices that have data: array points without data, which are in no frame, become 0 devices of 1 byte."""
+    """The devices; array points without data, which are in no frame, become 0 devices of 1 byte."""
     if is_everywhere(devices.data_bytes > 0):
         return devices
     number = choose(devices.data_bytes > 0, devices.number, 0)
@@ -395,7 +395,7 @@ def _frame_ends(
 
 
 def _all_devices(network: Network) -> tuple[Devices, ...]:
-    """All devices in their order, with their data, in this cycle or not."""
+    """All devices in their order, with their data whether their group is due or not."""
     return tuple(Devices(group.nodes, data_bytes(group, network), _starts(group)) for group in network.groups)
 
 

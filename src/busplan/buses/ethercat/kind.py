@@ -260,7 +260,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
-        """Whether execution counts: in latencies only, for no device delays a frame."""
+        """Whether execution counts: in latencies only, since no device delays a frame for it."""
         return of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
