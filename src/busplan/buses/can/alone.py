@@ -161,7 +161,7 @@ class CanCycle(BusCycle):
         return self.network._replace(profile=profile.model_copy(update={"bus": bus}))
 
     def _broken_with(self, repeated: int) -> str:
-        """What some repeated frames in a row break, in words."""
+        """Words on the first thing that some repeated frames in a row make late."""
         traffic = replace(traffic_of(self.network), error_burst=repeated).longest
         late = self.of(traffic).first_late()
         return f" makes {late} late" if late else " is not shown to fit"

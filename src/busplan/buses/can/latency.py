@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import ceil, inf, isclose
-from typing import Final
+from typing import Final, NamedTuple
 
 from busplan.buses.can.equations import bit_us
 from busplan.buses.can.streams import Points, Stream, repeated, repeated_by_place, streams
@@ -29,26 +29,7 @@ def phases(traffic: Traffic, place: int, name: str) -> dict[str, Number]:
 
         return traffic.ask(of, *behind, words=words)
 
-    # A derivation says which frames were counted, and what a queue does that is not by priority.
-    point, words, last = traffic.point, ("", ""), None
-    if isinstance(point, Traced):
-        there = traffic.at(point.value)
-        words, last = _counted(there, place), _last_in_queue(there, place)
-    blocks, before = (f": {frames}" if frames else "" for frames in words)
-    behind: tuple[Number, ...] = ()
-    of_queue, source, lower = "", "", name
-    higher = f"of higher priorities before {name}"
-    if last is not None:
-        of_queue, source, lower = "(L)", _QUEUES, "L"
-        higher = f"of its queue and of higher priorities than L before {name}"
-        is_late = any(message.name == name for message in traffic.messages)
-        said = (
-            f"the lowest priority in the queue, {int(last.last):#x} of {last.label}: "
-            f"{name} waits for all before it{', and comes to others R - C later' if is_late else ''} "
-            "(Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012)"
-        )
-        identifier = traffic.ask(lambda _: last.last, words=said)
-        behind = (named(identifier, "last_in_queue", "L", source),)
+    said = _said(traffic, place, name)
     frame_us = figure("frame_us", f"the last frame of {name}")
     instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
     period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
@@ -59,16 +40,18 @@ def phases(traffic: Traffic, place: int, name: str) -> dict[str, Number]:
     parts_us = {
         "jitter_us": named(figure("jitter_us", f"how late {name} may be queued"), "jitter_us", "J"),
         "blocking_us": named(
-            figure("blocking_us", f"the longest frame of a lower priority than {lower}{blocks}", *behind),
+            figure(
+                "blocking_us", f"the longest frame of a lower priority than {said.lower}{said.blocks}", *said.behind
+            ),
             "blocking_us",
-            f"B{of_queue}",
-            source,
+            f"B{said.of_queue}",
+            said.source,
         ),
         "interference_us": named(
-            figure("interference_us", f"frames {higher}, in its worst instance{before}", *behind),
+            figure("interference_us", f"frames {said.higher}, in its worst instance{said.before}", *said.behind),
             "interference_us",
-            f"I{of_queue}",
-            source,
+            f"I{said.of_queue}",
+            said.source,
         ),
         "backlog_us": named(
             choose(instance < inf, instance * frame_us - periods * period_us, instance), "backlog_us", "q (C - T)"
@@ -81,12 +64,53 @@ def phases(traffic: Traffic, place: int, name: str) -> dict[str, Number]:
     has_deadline = not any(message.deadline_us is NO_DEADLINE_US for message in own)
     return numbered(
         parts_us,
-        source,
+        said.source,
         identifier=figure("last", f"identifier of {name}"),
         data_bytes=figure("data_bytes", f"data of {name}"),
         instance=instance,
         deadline_us=figure("deadline_us", f"deadline of {name}") if has_deadline else inf,
     )
+
+
+class _Said(NamedTuple):
+    """Words of a derivation on the frames of a response."""
+
+    blocks: str = ""
+    """The frame that blocks, where a derivation is recorded."""
+    before: str = ""
+    """The frames that go before, where a derivation is recorded."""
+    lower: str = ""
+    """Name or symbol of what a frame of a lower priority is behind."""
+    higher: str = ""
+    """Sort of the frames that go before."""
+    of_queue: str = ""
+    """Argument of B and I in a queue that is not by priority."""
+    source: str = ""
+    """Source of the response in such a queue."""
+    behind: tuple[Number, ...] = ()
+    """Last identifier in such a queue, L."""
+
+
+def _said(traffic: Traffic, place: int, name: str) -> _Said:
+    """Words on the response of a name at a place of `responses`: the frames counted, and what its queue does."""
+    point, lower, higher = traffic.point, name, f"of higher priorities before {name}"
+    if not isinstance(point, Traced):
+        return _Said(lower=lower, higher=higher)
+    there = traffic.at(point.value)
+    blocks, before = (f": {frames}" if frames else "" for frames in _counted(there, place))
+    last = _last_in_queue(there, place)
+    if last is None:
+        return _Said(blocks, before, lower, higher)
+    is_late = any(message.name == name for message in traffic.messages)
+    words = (
+        f"the lowest priority in the queue, {int(last.last):#x} of {last.label}: "
+        f"{name} waits for all before it{', and comes to others R - C later' if is_late else ''} "
+        "(Davis, Kollmann, Pollex, Slomka 2011; Davis, Navet 2012)"
+    )
+    identifier = traffic.ask(lambda _: last.last, words=words)
+    behind = (named(identifier, "last_in_queue", "L", _QUEUES),)
+    higher = f"of its queue and of higher priorities than L before {name}"
+    return _Said(blocks, before, "L", higher, "(L)", _QUEUES, behind)
 
 
 def numbered(parts_us: Mapping[str, Number], source: str = "", **figures: Number) -> dict[str, Number]:

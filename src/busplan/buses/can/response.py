@@ -63,10 +63,10 @@ class Senders(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a busy period begins."""
+    """Start of a busy period."""
 
     once_us: Table
-    """What each sender sends once [us]."""
+    """Frames that each sender sends once [us]."""
     jitter_us: Table
     """Jitter J of each group, in columns by group; negative where its first frames come behind the start [us]."""
 
@@ -230,7 +230,7 @@ def _respond(answered: Sequence[int], senders: Senders, start: Start, found: Res
 
 
 def cycle_waits(most: int, others_us: Row, bit_us: Row, messages: Messages) -> CycleWaits:
-    """How long a cycle lasts beside other messages at each point, of which `most` frames may block it.
+    """Time of a cycle beside other messages at each point, of which `most` frames may block it.
 
     It is the smallest w = others + blocked(w) + sum over the messages before the last PDO of ceil((w + J + bit) / T) C.
     With a load of these messages over `NEARLY_FULL` w is a bound in closed form, which from `SATURATED` on only says

@@ -231,11 +231,11 @@ class KnownPeriods(Limit):
         return 0
 
     def perhaps(self, network: Network) -> Number:
-        """All of them: the assumption may hold [1]."""
+        """The same number: the assumption may hold [1]."""
         return self.value(network)
 
     def words(self, network: Network) -> str:
-        """Their names."""
+        """Names of the messages whose period is assumed."""
         names = [message.name for message in network.profile.message if message.period_grade == "assumed"]
         return f"the period of {first_of(names, 3)} is assumed: give what their specification or a log says"
 
@@ -257,11 +257,11 @@ class KnownSenders(Limit):
         return 0
 
     def perhaps(self, network: Network) -> Number:
-        """All of them: nothing may wait in their queues [1]."""
+        """The same number: nothing may wait in the queues [1]."""
         return self.value(network)
 
     def words(self, network: Network) -> str:
-        """Their names."""
+        """Names of the messages without a sender."""
         names = first_of(_unknown_senders(network), 3)
         return f"{names}: who sends it is not known, so neither what waits in its queue"
 
