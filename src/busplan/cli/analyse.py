@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 import busplan
 from busplan.cli.answering import profile_files, require_apart
-from busplan.cli.command import Call, Fails, command, load_changed, load_each
+from busplan.cli.command import Call, Fails, command, load_each
 from busplan.cli.options import (
     ALL_MODELS,
     TimingModelOption,
@@ -327,7 +326,7 @@ def report_command(
         )
     with progress_bar("circle tests") as progress:
         return busplan.report(
-            load_each(profiles, partial(load_changed, changes=call.changes)),
+            load_each(profiles, lambda argument: Call(argument, call.changes).profile),
             title=title,
             circle=circle,
             progress=progress,

@@ -262,11 +262,6 @@ def _period_changes(text: str) -> list[KeyChange]:
         raise BusplanError(f"--period {text}: expected times with their unit between commas, as 500us,1ms") from None
 
 
-def load_changed(argument: str, changes: KeyChanges) -> "Profile":
-    """Read a profile and apply the values of options."""
-    return Call(argument, changes).profile
-
-
 def load_each(arguments: Sequence[str], load: "Callable[[str], Profile]") -> "list[Profile]":
     """Read every profile.
 

@@ -20,6 +20,7 @@ from busplan.cli.options import (
     AllOption,
     FormatOption,
     JobsOption,
+    complete_kind,
     form_of_file,
     form_typed,
     output_option,
@@ -420,17 +421,13 @@ def _fault(text: str, units: Mapping[str, str]) -> tuple[str, Any]:
     return name, int(value) if value.isdecimal() else value or None
 
 
-def _varied(name: str, words: str, *, default: str) -> Any:
-    """The option of a key and its values."""
-    return typer.Option(name, metavar="KEY=VALUES", help=f"{words}{VALUES_HELP}  [default: {default}]")
-
-
 def _direction(name: str, *, default: str) -> Any:
-    words = (
+    help_ = (
         f"Quantity on the {name[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the number "
         "of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
+        f"{VALUES_HELP}  [default: {default}]"
     )
-    return _varied(name, words, default=default)
+    return typer.Option(name, metavar="KEY=VALUES", help=help_)
 
 
 def _axes(**texts: str | None) -> dict[str, dict[str, str] | None]:
@@ -505,10 +502,8 @@ def explore_command(
 
 def _complete_kinds(incomplete: str) -> list[str]:
     """Complete the last of several names of kinds for the shell."""
-    from busplan.buses import kind_names
-
     before, comma, last = incomplete.rpartition(",")
-    return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
+    return [f"{before}{comma}{name}" for name in complete_kind(last)]
 
 
 @command("It changes the profile before that is put on other kinds.", period="one", is_drawn=True)

@@ -10,7 +10,7 @@ import typer
 
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.cli.command import command
-from busplan.cli.options import complete_profile, time_us
+from busplan.cli.options import complete_kind, complete_profile, time_us
 from busplan.cli.output import message_width, say
 from busplan.english import listed
 from busplan.errors import BusplanError
@@ -43,7 +43,7 @@ def init_command(
             metavar="KIND",
             help=f"Kind of bus: {', '.join(kind_names())}, or another name, as firewire, can-fd, profibus or "
             f"dynamixel.  [default: {_KIND}]",
-            autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
+            autocompletion=complete_kind,
         ),
     ] = None,
     nodes: Annotated[

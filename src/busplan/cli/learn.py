@@ -9,7 +9,7 @@ import typer
 import busplan
 from busplan.cli.answering import require_apart
 from busplan.cli.command import command
-from busplan.cli.options import output_option
+from busplan.cli.options import complete_kind, output_option
 from busplan.cli.output import emit_document, emit_pages, progress_bar, say
 from busplan.errors import BusplanError
 from busplan.files import write_file
@@ -110,13 +110,6 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
     )
     table = Table(columns, tuple(rows), Sentence(("Shipped profiles",)))
     return Report(Sentence(("Shipped profiles",)), (table,), document("profiles", profiles=records), records)
-
-
-def complete_kind(incomplete: str) -> list[str]:
-    """Complete the name of a kind of bus for the shell."""
-    from busplan.buses import kind_names
-
-    return [name for name in kind_names() if name.startswith(incomplete)]
 
 
 @command(of="nothing")

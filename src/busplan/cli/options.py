@@ -27,6 +27,13 @@ def complete_profile(incomplete: str) -> list[str]:
     return [name for name in shipped_names() if name.startswith(incomplete)]
 
 
+def complete_kind(incomplete: str) -> list[str]:
+    """Complete the name of a kind of bus for the shell."""
+    from busplan.buses import kind_names
+
+    return [name for name in kind_names() if name.startswith(incomplete)]
+
+
 ProfileArgument = Annotated[
     str,
     typer.Argument(
