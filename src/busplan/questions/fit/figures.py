@@ -120,6 +120,17 @@ def most_nodes(
     ceiling
         No answer is larger [1].
     """
+    found = _most_nodes(with_nodes, limits, ceiling=min(ceiling, _PLAUSIBLE))
+    if ceiling <= _PLAUSIBLE or is_everywhere(found.nodes < _PLAUSIBLE):
+        return found
+    return _most_nodes(with_nodes, limits, ceiling=ceiling)
+
+
+_PLAUSIBLE: Final = 128
+"""More nodes are tried only where so many keep every limit: a cycle of a million takes long to count."""
+
+
+def _most_nodes(with_nodes: Callable[[Number], Network], limits: Sequence[Limit], *, ceiling: int) -> MostNodes:
     nodes: Number = ceiling
     most: dict[int, Number] = {}
     order = sorted(range(len(limits)), key=lambda index: limits[index].is_slow)
