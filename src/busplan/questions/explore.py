@@ -17,7 +17,8 @@ from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
-from busplan.questions.capacity.verdict import Fastest, Verdict, card, verdict_of
+from busplan.questions.capacity.verdict import Verdict, card, verdict_of
+from busplan.questions.fit.cure import Variants
 from busplan.questions.fit.grid import capacities
 from busplan.questions.fit.network import PERIOD, changed, varied_nodes
 from busplan.questions.map import (
@@ -188,16 +189,14 @@ def explore(
 
 
 def _judged(grid: Grid, progress: Progress) -> dict[tuple[int, int], Verdict]:
-    """The verdict of `capacity` at each setting; those that differ in their period alone share the fastest one."""
+    """The verdict of `capacity` at each setting; those that differ in their period alone share what it has no part in."""
     results = capacities(grid.network, [*grid.settings.values()])
-    fastest: dict[object, Fastest] = {}
+    variants: dict[object, Variants] = {}
     judged = {}
     for number, ((place, setting), result) in enumerate(zip(grid.settings.items(), results, strict=True)):
         progress(number, len(results))
-        point = setting.without(PERIOD)
-        verdict = verdict_of(setting.network, result, fastest=fastest.get(point))
-        fastest[point] = verdict.fastest, verdict.best_register
-        judged[place] = verdict
+        shared = variants.setdefault(setting.without(PERIOD), Variants(setting.network))
+        judged[place] = verdict_of(setting.network, result, variants=shared)
     return judged
 
 

@@ -520,8 +520,8 @@ class CanCycle(BusCycle):
             why = "frames of a burst wait" if self.traffic.access == "burst" else "messages in queues wait"
             lines.append(("upper bound", f"{why} up to {_short(possible_us)} us; they may wait less"))
         tried = range(int(c.MOST_REPEATED) + 1)
-        most = bisect_left(tried, 1, key=lambda number: not fits(self._with_burst(number))) - 1
-        if most >= 0:
+        if fits(self._with_burst(0)):
+            most = bisect_left(tried, 1, lo=1, key=lambda number: not fits(self._with_burst(number))) - 1
             kept = f"up to {most} in a row keep the verdict, one more" if most else "a single one"
             broken = self._broken_with(most + 1) if most < c.MOST_REPEATED else " was not tried"
             lines.append((REPEATED, kept + broken))

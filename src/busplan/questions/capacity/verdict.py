@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import Final, TypeAlias
+from typing import Final
 
 from busplan.buses.cycle import RestsOn
 from busplan.buses.network import Network
@@ -23,7 +23,7 @@ from busplan.questions.base.sentences import (
     used_us,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
-from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure
+from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, Variant, Variants, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
@@ -34,7 +34,7 @@ from busplan.questions.fit.figures import (
     limits_behind,
 )
 from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
-from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits, smallest_period
+from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits
 from busplan.questions.fit.network import changed
 from busplan.sections.base import MAX_COUNT
 
@@ -103,11 +103,9 @@ class Verdict:
         return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
 
 
-Fastest: TypeAlias = tuple[SmallestPeriod | None, SettingForPeriod | None]
-"""`fastest` and `best_register` of a verdict."""
-
-
-def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastest: Fastest | None = None) -> Verdict:
+def verdict_of(
+    network: Network, results: tuple[CapacityFigures, ...], *, variants: Variants | None = None
+) -> Verdict:
     """Judge a network at its period.
 
     Parameters
@@ -116,9 +114,10 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastes
         The network.
     results
         Its figures under the timing models that were asked for.
-    fastest
-        Those of the same network at another period, if they are known: they are the same.
+    variants
+        Those of the same network at another period, if they are known.
     """
+    variants = variants or Variants(network)
     bus = network.bus
     model = bus.deciding_model
     deciding = next((result for result in results if result.timing_model == model), None) or capacity_figures(
@@ -126,8 +125,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastes
     )
     cycle, period_us = bus.cycle(network, model=model), deciding.period_us
     missed = missed_limits(network)
-    change, no_change = _change(network, deciding, is_missed=bool(missed))
-    least, best = fastest or _fastest_of(network)
+    change, no_change = _change(network, deciding, variants, is_missed=bool(missed))
     return Verdict(
         network=network,
         period_us=period_us,
@@ -135,8 +133,8 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastes
         others=tuple(result for result in results if result is not deciding),
         broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
         missed_limits=missed,
-        fastest=least,
-        best_register=best,
+        fastest=variants.fastest if network.groups else None,
+        best_register=variants.best_register if network.groups else None,
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
         rests_on=cycle.rests_on(),
@@ -147,32 +145,33 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastes
     )
 
 
-def _fastest_of(network: Network) -> Fastest:
-    """The shortest period of a network as it is set, and the setting of a register that makes it the shortest."""
-    if not network.groups:
-        return None, None
-    least = smallest_period(network, is_safe=False, with_limits=False)
-    return least, best_register(network, least)
-
-
-def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple[Change | None, str]:
+def _change(
+    network: Network, now: CapacityFigures, variants: Variants, *, is_missed: bool
+) -> tuple[Change | None, str]:
     """The change that mends what is wrong or makes room on a full bus for one more node, or why there is none."""
-    if now.verdict != FITS or not now.safe or is_missed:
-        target = network
-    elif now.safe_nodes is None or now.safe_nodes > now.nodes:
-        return None, ""  # there is room, or nobody said which of the groups is to grow
-    elif now.safe_nodes == MAX_COUNT:
-        return None, f"{MAX_COUNT} nodes are the most that a profile can have"
-    else:
-        try:
-            target = changed(network, {NODES: now.safe_nodes + 1})
-        except BusplanError as error:
-            return None, str(error)
-    mending = cure(target)
-    if mending.changes is None:
+    target = Variant.of(network, variants)
+    if now.verdict == FITS and now.safe and not is_missed:
+        if now.safe_nodes is None or now.safe_nodes > now.nodes:
+            return None, ""  # there is room, or nobody said which of the groups is to grow
+        if now.safe_nodes == MAX_COUNT:
+            return None, f"{MAX_COUNT} nodes are the most that a profile can have"
+        one_more = target.after(more := {NODES: now.safe_nodes + 1})
+        if one_more is None:
+            return None, _refusal(network, more)
+        target = one_more
+    mending = cure(*target)
+    after = None if mending.changes is None else target.after(mending.changes)
+    if mending.changes is None or after is None:
         return None, mending.why
-    after = figures(changed(target, mending.changes), model=now.timing_model)
-    return Change(mending.changes, int(plain(target.nodes)), after), ""
+    return Change(mending.changes, int(plain(target.network.nodes)), figures(after.network, model=now.timing_model)), ""
+
+
+def _refusal(network: Network, changes: Changes) -> str:
+    try:
+        changed(network, changes)
+    except BusplanError as error:
+        return str(error)
+    return ""
 
 
 _CARD_WORDS: Final = 62
