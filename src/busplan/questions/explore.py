@@ -1,10 +1,9 @@
 """`busplan.explore`: what does a change do? Every setting of a grid, computed before the reader asks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import product
 from math import ceil, prod
 from typing import Final
 
@@ -19,20 +18,19 @@ from busplan.questions.base.arguments import ProfileLike, load_network, require_
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.capacity.verdict import Verdict, card, verdict_of
 from busplan.questions.fit.cure import Variants
-from busplan.questions.fit.grid import capacities
+from busplan.questions.fit.grid import GridPoint, capacities
 from busplan.questions.fit.network import PERIOD, changed, varied_nodes
 from busplan.questions.map import (
     Along,
     Cell,
     Direction,
-    Grid,
     MapAnswer,
     NotDrawn,
     design_value,
     direction,
     directions,
     map_of,
-    settings_of,
+    possible_points,
 )
 from busplan.questions.map.report import circle_words, map_document, map_drawing, title_of, value_text
 from busplan.sections.base import TRANSACTION_KINDS, value_at
@@ -173,31 +171,33 @@ def explore(
     maps, cards = [], []
     for number, variant in enumerate(networks):
         part = part_of(progress, number=number, of=len(networks))
-        grid = settings_of(variant, *chosen)
-        judged = _judged(grid, part_of(part, number=0, of=2) if circle else part)
+        points = possible_points(variant, *chosen)
+        verdicts = _judged(variant, [*points.possible.values()], part_of(part, number=0, of=2) if circle else part)
         answer = map_of(
-            grid,
-            {place: verdict.deciding for place, verdict in judged.items()},
+            variant,
+            *chosen,
+            points,
+            [verdict.deciding for verdict in verdicts],
             circle=circle,
             executor=executor,
             progress=part_of(part, number=1, of=2) if circle else ignored,
         )
+        judged = dict(zip(points.possible, verdicts, strict=True))
         maps.append(answer)
-        places = product(range(len(answer.rows)), range(len(answer.rows[0])))
-        cards.append(tuple(_card(answer, judged.get(place), answer.rows[place[0]][place[1]]) for place in places))
+        cells = (cell for row in answer.rows for cell in row)
+        cards.append(tuple(_card(answer, judged.get(number), cell) for number, cell in enumerate(cells)))
     return ExploreAnswer(network, third, tuple(maps), tuple(cards))
 
 
-def _judged(grid: Grid, progress: Progress) -> dict[tuple[int, int], Verdict]:
-    """The verdict of `capacity` at each setting; those that differ in their period alone share what it has no part in."""
-    results = capacities(grid.network, [*grid.settings.values()])
+def _judged(network: Network, points: Sequence[GridPoint], progress: Progress) -> list[Verdict]:
+    """The verdict of `capacity` at each point; those that differ in their period alone share what it has no part in."""
     variants: dict[object, Variants] = {}
-    judged = {}
-    for number, ((place, setting), result) in enumerate(zip(grid.settings.items(), results, strict=True)):
-        progress(number, len(results))
-        shared = variants.setdefault(setting.without(PERIOD), Variants(setting.network))
-        judged[place] = verdict_of(setting.network, result, variants=shared)
-    return judged
+    verdicts = []
+    for number, (point, result) in enumerate(zip(points, capacities(network, points), strict=True)):
+        progress(number, len(points))
+        shared = variants.setdefault(point.without(PERIOD), Variants(point.network))
+        verdicts.append(verdict_of(point.network, result, variants=shared))
+    return verdicts
 
 
 def _third(network: Network, over: Along | None, *, with_circle: bool) -> Direction | None:

@@ -103,9 +103,7 @@ class Verdict:
         return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
 
 
-def verdict_of(
-    network: Network, results: tuple[CapacityFigures, ...], *, variants: Variants | None = None
-) -> Verdict:
+def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, variants: Variants | None = None) -> Verdict:
     """Judge a network at its period.
 
     Parameters

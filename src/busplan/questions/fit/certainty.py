@@ -9,7 +9,7 @@ from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, plain, square_root, total, within
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"

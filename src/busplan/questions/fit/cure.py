@@ -467,7 +467,6 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
 
 def settings_to_be_carried(network: Network) -> Changes:
     """The cheapest setting of the bus with which some slice carries the network, where none does now; else empty."""
-
     variants = Variants(network)
 
     def is_carried(trial: Variants | None) -> bool:
