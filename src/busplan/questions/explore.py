@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from math import ceil, prod
 from typing import Final
 
@@ -29,6 +30,7 @@ from busplan.questions.map import (
     design_value,
     direction,
     directions,
+    in_rows,
     map_of,
     possible_points,
 )
@@ -182,10 +184,12 @@ def explore(
             executor=executor,
             progress=part_of(part, number=1, of=2) if circle else ignored,
         )
-        judged = dict(zip(points.possible, verdicts, strict=True))
         maps.append(answer)
-        cells = (cell for row in answer.rows for cell in row)
-        cards.append(tuple(_card(answer, judged.get(number), cell) for number, cell in enumerate(cells)))
+        judged = dict(zip(points.possible, verdicts, strict=True))
+        numbers = range(len(points.possible) + len(points.refused))
+        verdict_rows = in_rows([judged.get(number) for number in numbers], columns=len(answer.x.values))
+        pairs = zip(chain(*verdict_rows), chain(*answer.rows), strict=True)
+        cards.append(tuple(_card(answer, verdict, cell) for verdict, cell in pairs))
     return ExploreAnswer(network, third, tuple(maps), tuple(cards))
 
 

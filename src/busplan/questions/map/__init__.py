@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
 from math import ceil
-from typing import Any, Final, Literal, NamedTuple, get_args
+from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from busplan.questions.sweep.values import require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
+_Item = TypeVar("_Item")
 MOST_VALUES: Final = 64
 """Most values of a direction, enough for every gap count of IEEE 1394: more do not fit into 80 columns."""
 
@@ -246,14 +247,14 @@ def map_(
 
 
 def possible_points(network: Network, x: Direction, y: Direction | None) -> GridPoints:
-    """The points of two directions, row by row.
+    """The points of two directions, column by column.
 
     Raises
     ------
     BusplanError
         A profile can have none of them.
     """
-    along = (x,) if y is None else (y, x)
+    along = (x,) if y is None else (x, y)
     points = points_of(network, Grid({one.key: np.array(one.values, dtype=object) for one in along}))
     if not points.possible:
         raise BusplanError(f"no setting of this map can exist: {next(iter(points.refused.values()))}")
@@ -272,21 +273,22 @@ def map_of(
     progress: Progress,
 ) -> MapAnswer:
     """The map of some points from the figures of each under the model that decides, with circle tests if asked for."""
-    values = [*product((None,) if y is None else y.values, x.values)]
+    values = [*product(x.values, (None,) if y is None else y.values)]
     cells = {
-        number: _cell(point.network, fit, values[number][1], values[number][0])
+        number: _cell(point.network, fit, *values[number])
         for (number, point), fit in zip(points.possible.items(), fits, strict=True)
     }
     if circle:
         fitting = {number: points.possible[number] for number, cell in cells.items() if cell.state == FITS}
         cells |= _with_circles(network.profile, fitting, cells, executor=executor, progress=progress)
-    all_cells = [
-        cells.get(number) or NotDrawn(value_x, value_y, points.refused[number])
-        for number, (value_y, value_x) in enumerate(values)
-    ]
-    width = len(x.values)
-    rows = tuple(tuple(all_cells[start : start + width]) for start in range(0, len(all_cells), width))
-    return MapAnswer(network, x, y, rows, circle)
+    drawn = [cells.get(number) or NotDrawn(*at, points.refused[number]) for number, at in enumerate(values)]
+    return MapAnswer(network, x, y, in_rows(drawn, columns=len(x.values)), circle)
+
+
+def in_rows(items: Sequence[_Item], *, columns: int) -> tuple[tuple[_Item, ...], ...]:
+    """What stands column by column, row by row."""
+    height = len(items) // columns
+    return tuple(tuple(items[row::height]) for row in range(height))
 
 
 def directions(network: Network, x: Along | None, y: Along | None, *, with_circle: bool) -> tuple[Direction, Direction]:
