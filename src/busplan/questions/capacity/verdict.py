@@ -33,7 +33,7 @@ from busplan.questions.fit.figures import (
     figures,
     limits_behind,
 )
-from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
+from busplan.questions.fit.graded import HeavyAssumption
 from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits
 from busplan.questions.fit.network import changed
 from busplan.sections.base import MAX_COUNT
@@ -134,7 +134,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, varian
         fastest=variants.fastest if network.groups else None,
         best_register=variants.best_register if network.groups else None,
         after_reset=after_reset(network, deciding),
-        assumptions=heavy_assumptions(deciding, network),
+        assumptions=variants.assumptions(deciding),
         rests_on=cycle.rests_on(),
         bus_lines=cycle.card_lines(is_shown_to_fit),
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),

@@ -12,6 +12,8 @@ from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
 from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.errors import BusplanError
+from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.needs import (
     Need,
     SmallestPeriod,
@@ -61,6 +63,7 @@ class Variants:
         self.network = network
         """The network; its own period plays no part."""
         self._after: dict[frozenset[tuple[str, Value]], Variants | None] = {}
+        self._assumptions: tuple[HeavyAssumption, ...] | None = None
 
     def after(self, changes: Changes) -> "Variants | None":
         """The variants of the network after changes; None where its schema refuses them."""
@@ -74,6 +77,12 @@ class Variants:
             except BusplanError:
                 self._after[known] = None
         return self._after[known]
+
+    def assumptions(self, figures: FitFigures) -> tuple[HeavyAssumption, ...]:
+        """Assumptions with a large share of the required time or of its variance, from the figures at any period."""
+        if self._assumptions is None:
+            self._assumptions = heavy_assumptions(figures, self.network)
+        return self._assumptions
 
     @cached_property
     def needs(self) -> tuple[Need, ...]:
