@@ -1,6 +1,6 @@
 """`busplan.explore`: what does a change do? Every setting of a grid, computed before the reader asks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,10 +17,9 @@ from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
-from busplan.questions.capacity.verdict import Verdict, card, verdict_of
-from busplan.questions.fit.cure import Variants
-from busplan.questions.fit.grid import GridPoint, capacities
-from busplan.questions.fit.network import PERIOD, changed, varied_nodes
+from busplan.questions.capacity.verdict import Verdict, card, verdicts_of
+from busplan.questions.fit.grid import capacities
+from busplan.questions.fit.network import changed, varied_nodes
 from busplan.questions.map import (
     Along,
     Cell,
@@ -174,7 +173,9 @@ def explore(
     for number, variant in enumerate(networks):
         part = part_of(progress, number=number, of=len(networks))
         points = possible_points(variant, *chosen)
-        verdicts = _judged(variant, [*points.possible.values()], part_of(part, number=0, of=2) if circle else part)
+        possible = [*points.possible.values()]
+        judging = part_of(part, number=0, of=2) if circle else part
+        verdicts = verdicts_of(possible, capacities(variant, possible), progress=judging)
         answer = map_of(
             variant,
             *chosen,
@@ -191,17 +192,6 @@ def explore(
         pairs = zip(chain(*verdict_rows), chain(*answer.rows), strict=True)
         cards.append(tuple(_card(answer, verdict, cell) for verdict, cell in pairs))
     return ExploreAnswer(network, third, tuple(maps), tuple(cards))
-
-
-def _judged(network: Network, points: Sequence[GridPoint], progress: Progress) -> list[Verdict]:
-    """The verdict of `capacity` at each point; those that differ in their period alone share what it has no part in."""
-    variants: dict[object, Variants] = {}
-    verdicts = []
-    for number, (point, result) in enumerate(zip(points, capacities(network, points), strict=True)):
-        progress(number, len(points))
-        shared = variants.setdefault(point.without(PERIOD), Variants(point.network))
-        verdicts.append(verdict_of(point.network, result, variants=shared))
-    return verdicts
 
 
 def _third(network: Network, over: Along | None, *, with_circle: bool) -> Direction | None:

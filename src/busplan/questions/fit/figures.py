@@ -30,7 +30,7 @@ from busplan.questions.fit.certainty import (
     verdict_code,
 )
 from busplan.questions.fit.network import trial
-from busplan.sections.base import MAX_COUNT
+from busplan.sections.base import MAX_COUNT, value_at
 from busplan.sections.machine import ProfileGroup
 
 if TYPE_CHECKING:
@@ -577,21 +577,24 @@ def limits_behind(figures: FitFigures, network: Network) -> tuple[Limit, ...]:
     return tuple(limit for limit in network.bus.limits if limit.key in keys)
 
 
-def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:
-    """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset.
+def reset(network: Network, now: FitFigures) -> Network | None:
+    """The network after a bus reset; None where it is not shown to fit now, or where a reset changes nothing.
 
     Parameters
     ----------
     network
         The network.
-    deciding
+    now
         Its figures under the model that decides.
     """
     changes = network.bus.safety.after_reset
-    if deciding.verdict != FITS or not changes:
+    if now.verdict != FITS or all(value_at(network.profile, key) == value for key, value in changes.items()):
         return None
-    reset = trial(network, changes)
-    if reset.profile == network.profile:
-        return None
-    after = figures(reset, model=deciding.timing_model)
-    return None if after.verdict == FITS else after
+    return trial(network, changes)
+
+
+def after_reset(network: Network, now: FitFigures) -> FitFigures | None:
+    """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset."""
+    network_then = reset(network, now)
+    then = None if network_then is None else figures(network_then, model=now.timing_model)
+    return None if then is None or then.verdict == FITS else then

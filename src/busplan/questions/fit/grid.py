@@ -3,10 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import product
 from math import prod
-from typing import Any, Final, NamedTuple, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 from busplan.buses.network import Network
 from busplan.elementwise import plain
@@ -24,7 +21,10 @@ from busplan.questions.fit.figures import (
 from busplan.questions.fit.network import changed, model_names, trial, varied_nodes
 from busplan.sections.machine import ProfileGroup
 
-Array = NDArray[Any]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Array: TypeAlias = "NDArray[Any]"
 """Numbers, truth values, or objects if there are words among them."""
 AXES: Final = "axes"
 """Key of a direction along the number of motion axes. It is no key of a profile: it sets the number of nodes."""
@@ -75,6 +75,8 @@ class Grid(NamedTuple):
         Chunk
             In row-major order.
         """
+        import numpy as np
+
         # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
         cut = next(number for number in range(len(self.shape) + 1) if prod(self.shape[number + 1 :]) <= most)
         width = max(1, most // prod(self.shape[cut + 1 :]))
@@ -199,6 +201,8 @@ def _in_arrays(points: Sequence[GridPoint], *, without: str = "") -> Iterator[tu
         if len(places) == 1:
             yield places, first.network
             continue
+        import numpy as np
+
         values = {
             key: np.array([points[place].changes[key] for place in places], float) if _is_number(value) else value
             for key, value in first.without(without)
