@@ -8,17 +8,18 @@ arrays are.
 import operator
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import wraps
 from itertools import repeat
 from math import ceil, floor, inf, isinf, sqrt
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, ParamSpec, TypeAlias
 
-from busplan.sourced import Input, Sourced, input_of, short
+from busplan.sourced import Input, Sourced, constants_looked_up, input_of, short
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Number: TypeAlias = "float | NDArray[Any] | Traced"
+    Number: TypeAlias = float | Any  # a float to those who read it; arrays and traced numbers stand in for one
 else:
     Number: TypeAlias = object  # only type checkers ask what it is, and numpy stays unloaded
 """A plain number, an array, or a `Traced` number. Booleans count as numbers."""
@@ -147,10 +148,37 @@ class Traced:
         return bool(self.value)
 
     def __float__(self) -> float:
-        return plain(self)  # which refuses it: a plain number has lost its expression
+        if not self.is_constant:
+            raise TypeError("a traced number as a plain one has lost its expression")
+        return float(self.value)
 
     def __int__(self) -> int:
-        return int(plain(self))
+        return int(float(self))
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether no input of the profile is in it."""
+        return not self.given and all(part.is_constant for part in self.parts if isinstance(part, Traced))
+
+
+class TracedConstant(Traced):
+    """A sourced constant as an input of a derivation."""
+
+    __slots__ = ("constant",)
+
+    def __init__(self, constant: Sourced) -> None:
+        super().__init__(float(constant), given=input_of(constant))
+        self.constant = constant
+
+    @property
+    def is_constant(self) -> bool:
+        """True: it is one."""
+        return True
+
+    @property
+    def meaning(self) -> str:
+        """What the constant is, in one line."""
+        return self.constant.meaning
 
 
 def value_of(operand: Number) -> float:
@@ -184,24 +212,6 @@ def _applied(name: str, *numbers: Number) -> Number:
     return result
 
 
-def plain(number: Number) -> float:
-    """The very number, where it must be plain.
-
-    Raises
-    ------
-    TypeError
-        It is of another sort.
-
-    Examples
-    --------
-    >>> plain(3), plain(True)
-    (3, True)
-    """
-    if isinstance(number, _PLAIN):
-        return number
-    raise TypeError(f"expected a plain number, got {type(number).__name__}")
-
-
 def existing(number: Number) -> float | None:
     """A plain number; None for infinity, which stands for what does not exist.
 
@@ -210,8 +220,7 @@ def existing(number: Number) -> float | None:
     >>> existing(2.5), existing(inf)
     (2.5, None)
     """
-    value = plain(number)
-    return None if isinf(value) else value
+    return None if isinf(number) else number
 
 
 def within(number: Number, most: Number) -> Number:
@@ -442,7 +451,8 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
     3
     """
     if any(isinstance(number, Traced) for number in numbers):
-        value = function(*map(value_of, numbers))
+        with constants_looked_up(None):
+            value = function(*map(value_of, numbers))
         return Traced(value, formula=words, numbers=short(value), parts=numbers)
     if all(isinstance(number, _PLAIN) for number in numbers):
         return function(*numbers)
@@ -472,18 +482,29 @@ def named(number: Number, key: str, symbol: str, reference: str = "") -> Number:
     return number.named(key, symbol, reference) if isinstance(number, Traced) else number
 
 
+_Parameters = ParamSpec("_Parameters")
+
+
+def step(symbol: str, key: str = "") -> Callable[[Callable[_Parameters, Number]], Callable[_Parameters, Number]]:
+    """Decorator of a function whose result is a step of a derivation: its key is the function's name, or given."""
+
+    def of_function(function: Callable[_Parameters, Number]) -> Callable[_Parameters, Number]:
+        key_or_name = key or function.__name__.lstrip("_")
+
+        @wraps(function)
+        def with_name(*given: _Parameters.args, **by_name: _Parameters.kwargs) -> Number:
+            return named(function(*given, **by_name), key_or_name, symbol)
+
+        return with_name
+
+    return of_function
+
+
 def worded(number: Number, words: str) -> Number:
     """Say in words where a number comes from, for a derivation; any other number stays as it is."""
     if not isinstance(number, Traced):
         return number
     return Traced(number.value, formula=words, numbers=short(number.value), parts=(number,))
-
-
-def traced_with(constant: Number, number: Number) -> Number:
-    """A constant, traced where a number is: so that it is an input, though it meets other constants first."""
-    if isinstance(number, Traced) and isinstance(constant, Sourced):
-        return Traced(float(constant), given=input_of(constant))
-    return constant
 
 
 def total(parts: Iterable[Number]) -> Number:

@@ -115,6 +115,20 @@ def constants_changed(changed: ChangedConstants) -> Iterator[None]:
         _CHANGED.reset(token)
 
 
+_LOOKED_UP: Final[ContextVar[Callable[["Sourced"], Any] | None]] = ContextVar("constants looked up", default=None)
+
+
+@contextmanager
+def constants_looked_up(form: Callable[[Sourced], Any] | None) -> Iterator[None]:
+    """Give constants in another form where they are looked up, as traced numbers; None for plain constants."""
+    _look_up_each_time()
+    token = _LOOKED_UP.set(form)
+    try:
+        yield
+    finally:
+        _LOOKED_UP.reset(token)
+
+
 _LOCK: Final = Lock()
 _EVER_CHANGED: Final = Event()
 """Until the first change a constant that was looked up is an attribute, which is as fast as a name of a module."""
@@ -145,6 +159,9 @@ def cached(maxsize: int) -> Callable[[Callable[_Parameters, _Result]], Callable[
 
         @wraps(function)
         def of_these(*given: Any, **named: Any) -> _Result:
+            if _LOOKED_UP.get():
+                with constants_looked_up(None):
+                    return of_these(*given, **named)
             return of_constants(_CHANGED.get(), *given, **named)
 
         return cast("Callable[_Parameters, _Result]", of_these)
@@ -197,7 +214,7 @@ class Constants(Mapping[str, Sourced]):
                 self._own[name] = Sourced(**{"value": nan, **words}, name=name)
 
     def __getitem__(self, name: str) -> Sourced:
-        return self._numbers(_CHANGED.get())[name]
+        return _in_form(self._numbers(_CHANGED.get())[name])
 
     def __getattr__(self, name: str) -> Sourced:
         # Reached only where the instance has no such attribute.
@@ -209,7 +226,7 @@ class Constants(Mapping[str, Sourced]):
         with _LOCK:
             if not _EVER_CHANGED.is_set():
                 vars(self)[name] = number
-        return number
+        return _in_form(number)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._own)
@@ -236,7 +253,7 @@ class Constants(Mapping[str, Sourced]):
             start, numbers = f"{name}[", self._numbers(changed)
             of_name = {key[len(start) : -1]: number for key, number in numbers.items() if key.startswith(start)}
             table = self._tables[changed, name] = MappingProxyType(of_name)
-        return table
+        return {key: _in_form(number) for key, number in table.items()} if _LOOKED_UP.get() else table
 
     def _numbers(self, changed: ChangedConstants) -> dict[str, Sourced]:
         """All constants with other values, and what is computed of these."""
@@ -255,6 +272,12 @@ class Constants(Mapping[str, Sourced]):
             self._tables.clear()
         self._versions[changed] = numbers
         return numbers
+
+
+def _in_form(number: Sourced) -> Sourced:
+    """A constant as it is asked for; see `constants_looked_up`."""
+    form = _LOOKED_UP.get()
+    return form(number) if form else number
 
 
 _KEPT: Final = 64

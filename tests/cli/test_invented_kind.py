@@ -26,7 +26,7 @@ from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import (
     Cost,
     EventKind,
-    Limit,
+    ExactLimit,
     PayloadRange,
     Perturbation,
     Setting,
@@ -134,7 +134,7 @@ class Ring(Bus):
     deciding_model = "plain"
     figures = BusFigures(TERMS, added=(ROUNDS,), table=(ROUNDS,))
     limits = (
-        Limit(
+        ExactLimit(
             "nodes",
             "{value:.0f} stations are over the {most:.0f} of a ring",
             lambda network: network.nodes,

@@ -32,7 +32,6 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, Rule
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sourced import Constants
@@ -132,13 +131,13 @@ class Bus(ABC):
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
         """Cycles between set-points of the fastest group with axes: the key that sets them, and their number."""
-        with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
-        fastest = min(with_axes, key=lambda group: plain(group.every))
-        return fastest.payload_key("every"), int(plain(fastest.every))
+        with_axes = [group for group in network.groups if group.axes] or network.groups
+        fastest = min(with_axes, key=lambda group: group.every)
+        return fastest.payload_key("every"), int(fastest.every)
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
         """Say how large a network is, in plain numbers: each number with its noun."""
-        return (int(plain(network.nodes)), "node"), (int(plain(network.axes)), "axis")
+        return (int(network.nodes), "node"), (int(network.axes), "axis")
 
     def path_words(self, network: Network) -> str:  # noqa: ARG002 - a kind may have a single way
         """Say which distance on the wire each node is charged with, where the kind has a choice."""

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.buses.figure import REQUIRED, Figure, term_name
 from busplan.buses.network import Group, Network, Rate
-from busplan.elementwise import Number, is_off, plain, total
+from busplan.elementwise import Number, is_off, total
 
 Rounds: TypeAlias = Literal["all", "first", "but first"]
 ALL: Final[Rounds] = "all"
@@ -220,10 +220,15 @@ class BusCycle(ABC):
         alone = {term: min(causes) for term, causes in keys.items() if len(causes) == 1}
         return tuple(Term(key, us, alone.get(key, "")) for key, us in self.by_term.items())
 
-    @property
+    @cached_property
     def required_us(self) -> Number:
         """Time that the whole cycle needs, the sum of its terms: N times equation (2) of the paper [us]."""
         return total(self.by_term.values())
+
+    @property
+    def required_time_slice_us(self) -> Number:
+        """Time slice that each node needs [us]."""
+        return self.required_us / self.network.nodes
 
     @property
     def most_required_us(self) -> Number:
@@ -256,7 +261,7 @@ class BusCycle(ABC):
 
     def taking_us(self, group: Group) -> float:
         """Time from a command's arrival at a node to its effect: the slowest execution of a write [us]."""
-        return plain(group.write_execution_us + group.worst_extra_us)
+        return group.write_execution_us + group.worst_extra_us
 
     def sampled_us(self) -> float:
         """When nodes sample the feedback that a cycle carries, from its start; of plain numbers [us]."""
@@ -309,7 +314,7 @@ class BusCycle(ABC):
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The events of each round, which are never interrupted; of plain numbers."""
         for run in self.runs:
-            count = 1 if run.times is None else int(plain(run.times))
+            count = 1 if run.times is None else int(run.times)
             first, rounds = self._turns(run)
             for number in range(count):
                 yield _round(run, number, None if run.group is None else first + number // rounds)
@@ -318,8 +323,8 @@ class BusCycle(ABC):
         """First node of a run, and the number of rounds of each node; of plain numbers."""
         if run.group is None:
             return 1, 1
-        nodes = [int(plain(group.nodes)) for group in self.network.groups]
-        return sum(nodes[: run.group]) + 1, int(plain(run.times or 1)) // nodes[run.group]
+        nodes = [int(group.nodes) for group in self.network.groups]
+        return sum(nodes[: run.group]) + 1, int(run.times or 1) // nodes[run.group]
 
     def arrival_us(self, node: int) -> float:
         """When a node has its command, from the start of a cycle of plain numbers [us].
@@ -332,7 +337,7 @@ class BusCycle(ABC):
         arrived_us, now_us = None, 0.0
         for run in self.runs:
             first, rounds = self._turns(run)
-            count = 1 if run.times is None else int(plain(run.times))
+            count = 1 if run.times is None else int(run.times)
             last = (node - first + 1) * rounds - 1 if run.group is not None else count - 1
             if 0 <= last < count:
                 until_us = _until_us(run, last, self.command_events)
@@ -385,7 +390,7 @@ def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
     for event in run.events if run.laid_out is None else run.laid_out(number):
         if event.rounds == ALL or (event.rounds == FIRST) == (number == 0):
             has_node = node is not None and event.transaction is not None
-            yield event._replace(us=plain(event.us), node=node if has_node else event.node)
+            yield event._replace(us=event.us, node=node if has_node else event.node)
 
 
 def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]) -> float | None:
@@ -393,10 +398,10 @@ def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]
     if not any((event.transaction, event.kind) in commands for event in run.events):
         return None
     if len(run.events) == 1:
-        return plain(run.events[0].us)
+        return run.events[0].us
     until_us = now_us = 0.0
     for event in _round(run, number, None):
-        now_us += plain(event.us)
+        now_us += event.us
         if (event.transaction, event.kind) in commands:
             until_us = now_us
     return until_us
@@ -410,4 +415,4 @@ def _rounds_us(run: Run, count: int) -> float:
     if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ: the mean one
         events = run.laid_out((count - 1) / 2)
     counts = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
-    return sum(counts[event.rounds] * plain(event.us) for event in events)
+    return sum(counts[event.rounds] * event.us for event in events)

@@ -349,6 +349,8 @@ class BusFigures(NamedTuple):
     """Rows of the table of `latency`, where they are not the terms."""
     latency_shown: tuple[str, ...] = ()
     """Keys of the rows that any answer shows; all where it is empty."""
+    latency_main: str = ""
+    """Key of the row that the name of a transaction means; the last where it is empty."""
     latency_document: tuple[Figure, ...] = ()
     """Figures of `latency`, in the order of its document, where it has more than those rows."""
     has_many_transactions: bool = False

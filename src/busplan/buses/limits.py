@@ -1,7 +1,9 @@
 """Parts of a kind of bus: timing models, limits, settings of a plan, and the start of a new profile."""
 
+from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import reduce
 from math import inf
@@ -10,7 +12,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject, told_apart
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain, smaller
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, next_entry, smaller
 from busplan.sourced import Grade
 
 Value = int | float | str
@@ -85,130 +87,192 @@ _MOST: Final = 1e300
 """A number so large that none of a plan comes near it, and that may be subtracted from infinity."""
 
 
-class Limit(NamedTuple):
-    """A `value` that must not exceed a bound, `most`, and the words for a network where it does.
+Role = Literal["cycle", "safety", "period"]
+
+
+class Limit(ABC):
+    """A value that must not exceed a bound, with its doubt and its words.
 
     Value and doubt must not decrease as nodes are added.
     """
 
     key: str
-    over: str | Callable[[Network], str]
-    """Sentence on a limit that is broken or not shown to be kept: a format with `value`, its `uncertainty`, `most` and
-    the profile's `bus`; or a function that writes it."""
-    value: Callable[[Network], Number]
-    most: Callable[[Network], Number]
-    doubt: Callable[[Network], Number] | None = None
-    """Standard uncertainty of value - bound, both times; None if both are exact."""
-    perhaps: Callable[[Network], Number] | None = None
-    """Part of the value that is only possible: it can keep the limit from being shown to be kept, but not break it."""
-    period: "Callable[[Limit, Network], Number] | None" = None
-    """Shortest period that keeps the limit, for a network [us]; None where a longer period does not help."""
-    way_out: str = ""
+    label = ""
+    """What limits, in a few words, where the key does not say it."""
+    way_out = ""
     """Advice for a network that has no room for more nodes because of this limit: a format with `most`, and with the
     constants of the kind as `c`."""
-    role: Literal["cycle", "safety", "period"] = "cycle"
+    role: Role = "cycle"
     """cycle: a part of the verdict. safety: not a part of the verdict, but no advice breaks it. period: depends on the
     period alone, and a plan chooses no period that breaks it."""
-    place: str = "cycle.period_us"
+    place = "cycle.period_us"
     """Key at which the rule of the verdict reports it."""
-    has_rule: bool = False
+    has_rule = False
     """Whether a rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
-    is_slow: bool = False
+    has_period = False
+    """Whether a longer period keeps it."""
+    is_slow = False
     """Whether its value and period are slow to compute, and of plain numbers: it is evaluated last."""
-    label: str = ""
-    """What limits, in a few words, where the key does not say it."""
-
-    of_deadlines: bool = False
+    of_deadlines = False
     """Whether it must be kept for messages to be shown to keep their deadlines."""
 
-    @property
-    def nominal(self) -> "Limit":
-        """The same limit without uncertainty."""
-        return self._replace(doubt=None, perhaps=None)
+    @abstractmethod
+    def value(self, network: Network) -> Number:
+        """The value."""
+
+    @abstractmethod
+    def most(self, network: Network) -> Number:
+        """The bound."""
+
+    @abstractmethod
+    def words(self, network: Network) -> str:
+        """By how much a network of plain numbers breaks it, or that it is not shown to be kept: a sentence."""
+
+    def doubt(self, network: Network) -> Number:  # noqa: ARG002 - most are exact
+        """Standard uncertainty of value - bound."""
+        return 0.0
+
+    def perhaps(self, network: Network) -> Number:  # noqa: ARG002 - most are exact
+        """Part of the value that is only possible: it can leave the limit not shown, but not break it."""
+        return 0.0
+
+    def advice(self, network: Network) -> str:
+        """`way_out` for a network."""
+        bound = {"most": self.most(network)} if "{most" in self.way_out else {}
+        return self.way_out.format(**bound, c=network.bus.constants)
+
+    def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:  # noqa: ARG002 - most have none
+        """Shortest period at which it is kept, or shown to be kept; infinite where no longer period helps [us]."""
+        return inf
 
     @property
-    def shown(self) -> "Limit":
+    def nominal(self) -> "Held":
+        """The limit on the value without its uncertainty."""
+        return Held(self, is_shown=False)
+
+    @property
+    def shown(self) -> "Held":
         """The limit on value + U: a network that keeps it is shown to keep this one."""
-        if self.doubt is None and self.perhaps is None:
-            return self
-        return self.nominal._replace(value=lambda network: self.value(network) + self.uncertainty(network))
+        return Held(self, is_shown=True)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether its value has neither doubt nor a part that is only possible."""
+        return not self.has_doubt and type(self).perhaps is Limit.perhaps
+
+    @property
+    def has_doubt(self) -> bool:
+        """Whether its value has a standard uncertainty."""
+        return type(self).doubt is not Limit.doubt
 
     def uncertainty(self, network: Network) -> Number:
-        """Expanded uncertainty U of the value, two standard uncertainties; 0 where it is exact."""
-        return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
+        """Expanded uncertainty U of the value, two standard uncertainties."""
+        doubt = self.doubt(network)
+        return 0.0 if is_off(doubt) else COVERAGE * doubt
 
     def least_value(self, network: Network) -> Number:
         """Lower bound of the value: value - U, without the part that is only possible."""
-        least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
-        if self.perhaps is None:
-            return least
-        possible = self.perhaps(network)
-        return choose(possible < inf, least - smaller(possible, _MOST), -inf)
+        least, possible = self.value(network) - self.uncertainty(network), self.perhaps(network)
+        return least if is_off(possible) else choose(possible < inf, least - smaller(possible, _MOST), -inf)
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network surely breaks it, at the lower bound of the value: a bool, or an array of them."""
-        return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
-
-    def excess(self, network: Network) -> Number:
-        """By how much the lower bound of the value is over `most`: more than 0 where a network surely breaks it."""
-        return self.least_value(network) - self.most(network) * (1 + FIT_ROUNDING)
+        return is_over(self.least_value(network), self.most(network))
 
     def verdict_code(self, network: Network) -> Number:
         """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
         surely = choose(self.is_broken(network), BROKEN, KEPT)
-        if self.doubt is None and self.perhaps is None:
+        if self.is_exact:
             return surely
         return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
 
-    def shortest_period_us(self, network: Network) -> Number:
-        """Shortest period that keeps it; infinite where no longer one does [us]."""
-        return inf if self.period is None else self.period(self, network)
 
-    def advice(self, network: Network) -> str:
-        """`way_out` for a network."""
-        return (
-            self.way_out.format(most=self.most(network), c=network.bus.constants)
-            if "{" in self.way_out
-            else self.way_out
-        )
+def is_over(value: Number, most: Number) -> Number:
+    """Whether a value is over a bound, float rounding aside: a bool, or an array of them."""
+    return value > most * (1 + FIT_ROUNDING)
+
+
+class Held(NamedTuple):
+    """A limit that a value is held against: the nominal value, or value + U."""
+
+    limit: Limit
+    is_shown: bool
+
+    @property
+    def key(self) -> str:
+        """Key of the limit."""
+        return self.limit.key
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether it is slow to compute."""
+        return self.limit.is_slow
+
+    def value(self, network: Network) -> Number:
+        """The value, with U if it must be shown."""
+        value = self.limit.value(network)
+        return value + self.limit.uncertainty(network) if self.is_shown else value
+
+    def excess(self, network: Network) -> Number:
+        """By how much the value is over the bound: more than 0 where a network breaks it."""
+        return self.value(network) - self.limit.most(network) * (1 + FIT_ROUNDING)
+
+    def is_broken(self, network: Network) -> Number:
+        """Whether the value is over the bound: a bool, or an array of them."""
+        return is_over(self.value(network), self.limit.most(network))
+
+    def shortest_period_us(self, network: Network) -> Number:
+        """Shortest period at which it is kept; infinite where no longer one helps [us]."""
+        return self.limit.shortest_period_us(network, is_shown=self.is_shown)
+
+
+@dataclass(frozen=True)
+class ExactLimit(Limit):
+    """A limit on a value that is known exactly, and that no longer period keeps."""
+
+    key: str
+    over: str | Callable[[Network], str]
+    """Sentence on a broken limit: a format with `value`, `most` and the profile's `bus`; or a function."""
+    value_of: Callable[[Network], Number]
+    most_of: Callable[[Network], Number]
+    way_out: str = ""
+    role: Role = "cycle"
+    place: str = "cycle.period_us"
+    has_rule: bool = False
+    is_slow: bool = False
+
+    def value(self, network: Network) -> Number:
+        """The value."""
+        return self.value_of(network)
+
+    def most(self, network: Network) -> Number:
+        """The bound."""
+        return self.most_of(network)
 
     def words(self, network: Network) -> str:
-        """Say by how much a network breaks it."""
+        """By how much a network breaks it."""
         if not isinstance(self.over, str):
             return self.over(network)
-        value, most, uncertainty = self.value(network), self.most(network), self.uncertainty(network)
-        return self.over.format(value=value, uncertainty=uncertainty, most=most, bus=network.profile.bus)
+        return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
 
 
-def share_of_period(
-    key: str,
-    over: Callable[[Network], str],
-    *,
-    us: Callable[[Network], Number],
-    share: Callable[[Network], Number],
-    doubt: Callable[[Network], Number],
-    perhaps: Callable[[Network], Number] | None = None,
-    way_out: str,
-) -> Limit:
-    """The limit of a time that must be over within a share of the period; a rule of its own reports it.
+class ShareOfPeriod(Limit):
+    """A time that must be over within a share of the period; it must not depend on the period [us]."""
 
-    Parameters
-    ----------
-    key, over, doubt, perhaps, way_out
-        As `Limit` has them.
-    us
-        The time; it must not depend on the period [us].
-    share
-        The share [1].
-    """
+    has_rule = True
+    has_period = True
 
-    def most_us(network: Network) -> Number:
-        return share(network) * network.period_us
+    def share(self, network: Network) -> Number:  # noqa: ARG002 - mostly all of it
+        """The share of the period [1]."""
+        return 1
 
-    def period_us(limit: Limit, network: Network) -> Number:
-        return limit.least_value(network) / share(network)
+    def most(self, network: Network) -> Number:
+        """The share of the period [us]."""
+        return self.share(network) * network.period_us
 
-    return Limit(key, over, us, most_us, doubt, perhaps, period_us, way_out, has_rule=True)
+    def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:
+        """The period whose share the time fills [us]."""
+        return Held(self, is_shown).value(network) / self.share(network)
 
 
 class Starter(NamedTuple):
@@ -402,16 +466,10 @@ PERIOD_LIMIT: Final = "period"
 
 
 def period_limit(periods: Periods) -> Limit:
-    """The limit that the bus must allow the period.
-
-    Parameters
-    ----------
-    periods
-        The periods that it allows.
-    """
-    return Limit(
+    """The limit that the bus must allow the period."""
+    return ExactLimit(
         PERIOD_LIMIT,
-        lambda network: periods.refusal(plain(network.period_us)),
+        lambda network: periods.refusal(network.period_us),
         lambda network: choose(periods.shortest_us(network.period_us) > network.period_us, 1, 0),
         lambda _network: 0,
         way_out="a period that the bus allows will do",
@@ -428,21 +486,9 @@ def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def nodes_limit(nodes: str, most: Callable[[], float], bus: str, *, of: str = "of a", has_rule: bool = False) -> Limit:
-    """The limit on the nodes of a bus.
-
-    Parameters
-    ----------
-    nodes, bus
-        What they are called.
-    most
-        Function that gives the most nodes of a bus [1].
-    of
-        Words between the number and the bus.
-    has_rule
-        As `Limit` has it.
-    """
+    """The limit on the nodes of a bus, by what both are called; `of` stands between the number and the bus."""
     over, way_out = f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}", f"a second {bus} has {{most:g}} more"
-    return Limit("nodes", over, lambda network: network.nodes, lambda _: most(), way_out=way_out, has_rule=has_rule)
+    return ExactLimit("nodes", over, lambda network: network.nodes, lambda _: most(), way_out, has_rule=has_rule)
 
 
 NODE: Final = "node"
@@ -458,9 +504,9 @@ def slow_groups(network: Network) -> Iterator[Group]:
 
 def busy_words(group: Group, network: Network) -> str:
     """Say how long a node of a group executes, and its period; of plain numbers."""
-    doubt_us = COVERAGE * plain(_busy_doubt_us(group))
+    doubt_us = COVERAGE * _busy_doubt_us(group)
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
-    busy, most = told_apart(plain(_busy_us(group)), plain(network.period_us * group.every))
+    busy, most = told_apart(_busy_us(group), (network.period_us * group.every))
     return f"a node executes for {busy}{either_way} us of {most} us"
 
 
@@ -487,12 +533,24 @@ def _busiest_us(network: Network, coverage: int) -> Number:
     return reduce(larger, busy_us)
 
 
-NODE_LIMIT: Final = share_of_period(
-    NODE,
-    _all_busy_words,
-    us=lambda network: (_busiest_us(network, -COVERAGE) + _busiest_us(network, COVERAGE)) / 2,  # middle of its bounds
-    share=lambda _network: 1,
-    doubt=lambda network: (_busiest_us(network, COVERAGE) - _busiest_us(network, -COVERAGE)) / 2 / COVERAGE,
-    way_out="a longer period or a faster node would do",
-)._replace(label="the execution time of a node")
-"""T_exec(read) + T_exec(write) + both worst extras <= n T_s, of every group with data in every n-th cycle."""
+class BusyNode(ShareOfPeriod):
+    """T_exec(read) + T_exec(write) + both worst extras <= n T_s, of every group with data in every n-th cycle."""
+
+    key = NODE
+    label = "the execution time of a node"
+    way_out = "a longer period or a faster node would do"
+
+    def value(self, network: Network) -> Number:
+        """The middle of the bounds of the busiest node [us]."""
+        return (_busiest_us(network, -COVERAGE) + _busiest_us(network, COVERAGE)) / 2
+
+    def doubt(self, network: Network) -> Number:
+        """Half of the distance of these bounds, over k [us]."""
+        return (_busiest_us(network, COVERAGE) - _busiest_us(network, -COVERAGE)) / 2 / COVERAGE
+
+    def words(self, network: Network) -> str:
+        """The groups that are too slow, and by how much."""
+        return _all_busy_words(network)
+
+
+NODE_LIMIT: Final = BusyNode()

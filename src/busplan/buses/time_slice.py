@@ -1,4 +1,9 @@
-"""The time slice of a communication cycle, equations (1) and (2) of the paper: they hold for every kind of bus."""
+"""The time slice of a communication cycle, equations (1) and (2) of the paper.
+
+Each parameter is a float or an array, and so is the result, in their broadcast shape; times are in us. N is the number
+of distributed nodes, the host not counted, and alpha the share of the period T_s that belongs to communication, 0..1.
+Zero nodes raise ZeroDivisionError. Other buses than IEEE 1394 have other terms: there a node's slice is T_need / N.
+"""
 
 from busplan.elementwise import Number
 from busplan.sourced import SYMBOLS, published
@@ -10,7 +15,10 @@ SYMBOLS.update(
         "nodes": "N",
         "available_us": "alpha T_s",
         "required_us": "T_need",
+        "reads_us": "T_r",
+        "writes_us": "T_w",
         "nonperiodic_us": "T_npd",
+        "sync_us": "CTS",
     }
 )
 
@@ -19,24 +27,7 @@ SYMBOLS.update(
 def time_slice_us(period_us: Number, *, slice_ratio: Number, nodes: Number) -> Number:
     """Communication time slice that the cycle gives each node.
 
-    Parameters
-    ----------
-    period_us
-        Communication period T_s [us]; float or array.
-    slice_ratio
-        Share alpha of the period that belongs to communication, 0..1 [1]; float or array.
-    nodes
-        Number of distributed nodes N, host not counted [1]; float or array.
-
-    Returns
-    -------
-    float
-        T_cs = alpha T_s / N [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `nodes` is zero.
+    T_cs = alpha T_s / N [us].
 
     Examples
     --------
@@ -47,30 +38,16 @@ def time_slice_us(period_us: Number, *, slice_ratio: Number, nodes: Number) -> N
 
 
 @published(2, symbol="T_cs", section="III-C")
-def required_time_slice_us(required_us: Number, *, nodes: Number) -> Number:
+def required_time_slice_us(
+    reads_us: Number, *, writes_us: Number, nonperiodic_us: Number, sync_us: Number, nodes: Number
+) -> Number:
     """Communication time slice that each node needs.
 
-    Parameters
-    ----------
-    required_us
-        What the whole cycle needs, the sum of its terms [us]; float or array. The paper has four: all reads T_r and all
-        writes T_w with their gaps, the time for non-periodic data T_npd, and the synchronous packet CTS.
-    nodes
-        Number of distributed nodes N [1]; float or array.
-
-    Returns
-    -------
-    float
-        T_cs = T_need / N [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `nodes` is zero.
+    T_cs = (T_r + T_w + T_npd + CTS) / N [us].
 
     Examples
     --------
-    >>> required_time_slice_us(300.0, nodes=2)
+    >>> required_time_slice_us(100.0, writes_us=150.0, nonperiodic_us=30.0, sync_us=20.0, nodes=2)
     150.0
     """
-    return required_us / nodes
+    return (reads_us + writes_us + nonperiodic_us + sync_us) / nodes

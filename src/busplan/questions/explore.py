@@ -10,7 +10,6 @@ from typing import Final
 
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Explorer, JsonDocument, Record, Report, Sentence, Slider
 from busplan.progress import Progress, ignored, part_of
@@ -202,7 +201,7 @@ def _third(network: Network, over: Along | None, *, with_circle: bool) -> Direct
     if not network.groups:
         return None
     varied = varied_nodes(profile)
-    kind = max(TRANSACTION_KINDS, key=lambda kind: float(plain(varied.bytes_of(kind))))
+    kind = max(TRANSACTION_KINDS, key=lambda kind: float(varied.bytes_of(kind)))
     key = varied.payload_key(kind)
     own = value_at(profile, key) or 0
     values = [size for size in sorted({ceil(own * times) for times in _TIMES}) if _is_possible(network, key, size)]

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.figure import Figure
 from busplan.buses.network import Network
-from busplan.elementwise import Number, existing, plain, within
+from busplan.elementwise import Number, existing, within
 from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Block,
@@ -179,7 +179,7 @@ def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
 
 
 def _transactions(network: Network, models: Sequence[str]) -> tuple[Transaction, ...]:
-    nodes = int(plain(network.nodes))
+    nodes = int(network.nodes)
     by_model = (network.bus.cycle(network, model=model).latencies() for model in models)
     return tuple(
         Transaction(model, phased.name, phased.group, phased.payload_bytes, nodes, _whole_bytes(phased.phases))

@@ -80,14 +80,16 @@ def test_equation_12_says_what_equation_3_says(parts: list[float]) -> None:
 
 def test_equation_11_inverts_equation_2_where_nothing_depends_on_the_nodes() -> None:
     reads_us = writes_us = 7 * (40.0 + 8.0)
-    needed_us = 7 * time_slice.required_time_slice_us(reads_us + writes_us + 0.0 + 0.5, nodes=7)
+    needed_us = 7 * time_slice.required_time_slice_us(
+        reads_us, writes_us=writes_us, nonperiodic_us=0.0, sync_us=0.5, nodes=7
+    )
     assert eq.published_nodes(needed_us, sync_us=0.5, latency_us=40.0, gaps_us=8.0) == pytest.approx(7)
     assert time_slice.time_slice_us(2 * needed_us, slice_ratio=0.5, nodes=7) == pytest.approx(needed_us / 7)
 
 
 ARRAY_CASES = {
     "time_slice_us": ("period_us", "slice_ratio", "nodes"),
-    "required_time_slice_us": ("required_us", "nodes"),
+    "required_time_slice_us": ("reads_us", "writes_us", "nonperiodic_us", "sync_us", "nodes"),
     "transaction_latency_us": (
         "request_us",
         "request_acknowledge_us",

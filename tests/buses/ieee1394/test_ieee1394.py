@@ -96,3 +96,18 @@ def test_the_doubt_of_the_gap_term_is_as_large_at_a_larger_gap_count_as_at_a_sma
     # Four halves of split transactions, each with half of the 4 / 98.304 us that a gap count adds to equation (4).
     by_hand_us = 4 * 2 * 58 / 98.304 / sqrt(3)
     assert doubt_us(63, 5) == doubt_us(5, 63) == pytest.approx(by_hand_us)
+
+
+@pytest.mark.parametrize(
+    ("name", "model"),
+    [("paper-4ms", "paper"), ("paper-4ms", "standard"), ("gantry-24", "standard"), ("dvrk", "standard")],
+)
+@pytest.mark.parametrize("changes", [{}, {"cycle.retries": 2, "bus.cycle_master": True}])
+def test_equation_2_sums_all_that_the_cycle_needs(name: str, model: str, changes: dict[str, object]) -> None:
+    changes = {} if model == "paper" else changes
+    profile = busplan.load_profile(name, changes={**changes, "cycle.nonperiodic_us": 17.0})
+    (figures,) = busplan.capacity(profile, timing_model=model).to_dict()["results"]
+    beside_us = figures["cycle_starts_us"] + figures["retries_us"]
+    parts_us = figures["reads_us"] + figures["writes_us"] + 17.0 + figures["sync_us"] + beside_us
+    assert figures["required_time_slice_us"] * figures["nodes"] == pytest.approx(parts_us, rel=1e-13)
+    assert parts_us == pytest.approx(figures["required_us"], rel=1e-13)

@@ -83,7 +83,9 @@ def test_every_phase_by_hand() -> None:
         "execution_us": 30.0,
         "worst_extra_us": 0.0,
         "latency_us": latency_us,
+        "interval_latency_us": latency_us,
         "request_and_acknowledge_us": request_us + acknowledge_us,
+        "request_and_acknowledge_eq15_us": 3.11 + 8 * 12 / 393.216,
         "response_and_acknowledge_us": response_us + acknowledge_us,
         "subaction_gap_us": subaction_us,
         "arbitration_reset_gap_us": reset_us,
@@ -93,6 +95,7 @@ def test_every_phase_by_hand() -> None:
         "idle_us": subaction_us,
         "host_us": 0.0,
         "transaction_us": latency_us + subaction_us,
+        "all_us": 2 * (latency_us + subaction_us),
     }
     assert phases == pytest.approx(expected, rel=1e-14)
 

@@ -82,9 +82,17 @@ def test_equation_2_adds_up_every_term_of_the_cycle(make: Make) -> None:
         "standard": f"cycle starts + {both} + host + retries + T_npd",
     }
     for model, formula in terms.items():
-        *_, needed, each = derived(make(), "required_time_slice_us", timing_model=model).steps
+        needed = derived(make(), "required_us", timing_model=model).steps[-1]
         assert (needed.symbol, needed.reference, needed.formula) == ("T_need", "(2)", formula)
-        assert (each.symbol, each.reference, each.formula) == ("T_cs,needed", "(2)", "T_need / N")
+        each = derived(make(), "required_time_slice_us", timing_model=model).steps[-1]
+        added = "" if model == "paper" else " + (cycle starts + retries) / N"
+        assert (each.symbol, each.reference) == ("T_cs,needed", "(2)")
+        assert each.formula == f"(T_r + T_w + T_npd + CTS) / N{added}"
+
+
+def test_all_equations_are_explained_by_their_numbers() -> None:
+    for number in range(1, 16):
+        assert busplan.explain("paper-4ms", f"({number})").derivations
 
 
 def test_the_rows_of_csv_are_the_steps_of_json() -> None:
@@ -251,7 +259,7 @@ def test_an_execution_time_that_nobody_graded_comes_first(make: Make) -> None:
         ("paper-1ms", "latency.gaps_us", ["gaps_us"], ["read", "write"]),
         ("paper-1ms", "(11)", ["nodes_eq11"], [None]),
         ("paper-1ms", "11", ["nodes_eq11"], [None]),
-        ("paper-1ms", "(12)", ["latency_us"], ["read", "write"]),
+        ("paper-1ms", "(12)", ["interval_latency_us"], ["read", "write"]),
         ("paper-1ms", "arbitration", ["cycle_arbitration_us"], [None]),
         ("paper-1ms", "synchronous packet CTS", ["sync_us"], [None]),
         ("paper-1ms", "T_sum", ["gaps_us"], [None]),

@@ -16,10 +16,10 @@ from busplan.questions.explain.formula import formula_of, formula_text, inputs, 
 from busplan.sourced import EQUATIONS, Input
 
 # As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
-# are equations of their own. The sum in (2) is one quantity here: a bus of another kind has other terms.
+# are equations of their own.
 PRINTED = {
     "time_slice_us": "alpha T_s / N",
-    "required_time_slice_us": "T_need / N",
+    "required_time_slice_us": "(T_r + T_w + T_npd + CTS) / N",
     "transaction_latency_us": "T_req + T_ack1 + T_exec + T_resp + T_ack2",
     "phy_delay_us": "14 / C",
     "hop_delay_us": "0.023 L / 4.5 + T_phy",

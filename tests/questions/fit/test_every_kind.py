@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.elementwise import Traced, plain
+from busplan.elementwise import Traced
 from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
 from busplan.questions.fit.figures import figures, node_counts
@@ -40,7 +40,7 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
             assert bus.event_kind(event.kind).key == event.kind
-            of_events[event.term].append(plain(event.us))
+            of_events[event.term].append(event.us)
         for term in cycle.terms:
             assert fsum(of_events.pop(term.key, [])) == pytest.approx(term.us, rel=1e-12, abs=1e-12)
         assert not of_events
@@ -77,7 +77,7 @@ def test_a_command_arrives_when_its_last_event_has_ended(
     ends_us: dict[int | None, float] = {}
     now_us = 0.0
     for event in cycle.events():
-        now_us += plain(event.us)
+        now_us += event.us
         if (event.transaction, event.kind) in cycle.command_events:
             ends_us[event.node] = now_us
     for node in {1, data.draw(st.integers(1, int(cycle.network.nodes))), int(cycle.network.nodes)}:

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.edit import profile_text
 from busplan.profile.sources import load
@@ -163,9 +162,9 @@ def test_events_add_up_to_the_terms(profile: busplan.Profile) -> None:
         cycle = cycle_of(profile, figures_of_model.timing_model)
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
-            of_events[event.term].append(plain(event.us))
+            of_events[event.term].append(event.us)
         for term in cycle.terms:
-            assert fsum(of_events.pop(term.key, [])) == pytest.approx(plain(term.us), rel=1e-12, abs=1e-12)
+            assert fsum(of_events.pop(term.key, [])) == pytest.approx(term.us, rel=1e-12, abs=1e-12)
         assert not of_events
 
 
@@ -186,7 +185,7 @@ def test_each_group_is_counted_as_a_brute_search_counts_it(profile: busplan.Prof
 def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: busplan.Profile) -> None:
     own, farthest = (changed(profile, {"bus.charge_hops": word}) for word in ("own", "farthest"))
     for shorter, longer in zip(figures(own).terms, figures(farthest).terms, strict=True):
-        assert plain(shorter.us) <= plain(longer.us) + 1e-9, shorter.key
+        assert shorter.us <= longer.us + 1e-9, shorter.key
 
 
 @given(profile=grouped())
@@ -386,7 +385,7 @@ def test_each_node_is_drawn_at_its_own_hops(
     first_us: dict[int, float] = {}
     for event in cycle_of(profile).events():
         if event.kind == kind and event.transaction == "read" and event.node is not None:
-            first_us.setdefault(event.node, plain(event.us))
+            first_us.setdefault(event.node, event.us)
     assert list(first_us) == [1, 2, 3, 4]
     steps_us = [first_us[node + 1] - first_us[node] for node in (1, 2, 3)]
     assert steps_us == pytest.approx([steps * hop_us] * 3, rel=1e-9)
@@ -405,4 +404,4 @@ def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(
         for profile in (make(bus__nodes=3, bus__charge_hops="own", bus__root=root), make(bus__nodes=3))
     )
     each_us = 0.020 / 3**0.5
-    assert plain(farthest.us) - plain(own.us) == pytest.approx(parts * (9 - 6) * each_us, rel=1e-9)
+    assert farthest.us - own.us == pytest.approx(parts * (9 - 6) * each_us, rel=1e-9)

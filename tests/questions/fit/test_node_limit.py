@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.limits import Limit
+from busplan.buses.limits import ExactLimit, Held
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, rounded_up
 from busplan.questions.fit.figures import most_nodes
@@ -25,11 +25,11 @@ FORMS: dict[str, Callable[[Number], Number]] = {
 }
 
 
-def limit_of(form: str, most: Number, is_slow: bool, *, less: Number = 0) -> Limit:
+def limit_of(form: str, most: Number, is_slow: bool, *, less: Number = 0) -> Held:
     def value(network: Network) -> Number:
         return FORMS[form](network.nodes) - less
 
-    return Limit(form, "", value, lambda _network: most, is_slow=is_slow)
+    return ExactLimit(form, "", value, lambda _network: most, is_slow=is_slow).nominal
 
 
 limits = st.lists(st.tuples(st.sampled_from(list(FORMS)), st.integers(-1, 120), st.booleans()), min_size=1, max_size=5)
@@ -53,7 +53,7 @@ def test_the_most_are_those_that_a_count_finds_and_the_first_limit_of_equal_ones
 def test_an_array_is_answered_as_each_of_its_points(asked: list[tuple[str, int, bool]], shape: tuple[int, int]) -> None:
     points = np.arange(shape[0])[:, None] + np.arange(shape[1])
 
-    def at(point: Number) -> list[Limit]:
+    def at(point: Number) -> list[Held]:
         bounds = [limit_of(form, most + point, is_slow) for form, most, is_slow in asked[::2]]
         return [*bounds, *(limit_of(*one, less=point) for one in asked[1::2])]
 

@@ -10,7 +10,6 @@ from pydantic.fields import FieldInfo
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.document import decode, validate
 from busplan.profile.kinds import models_of
@@ -73,18 +72,18 @@ def worth(profile: busplan.Profile) -> Mapping[str, float]:
     cycle = deciding_cycle(network)
     weighed = certainty(cycle)
     found = {
-        "required": plain(cycle.required_us),
-        "possible": plain(cycle.possible_us()),
-        "safe": plain(weighed.safe_required_us) + plain(cycle.possible_us()),
-        "jitter": plain(cycle.sync_jitter_us()),
+        "required": cycle.required_us,
+        "possible": cycle.possible_us(),
+        "safe": weighed.safe_required_us + cycle.possible_us(),
+        "jitter": cycle.sync_jitter_us(),
     }
     for limit in network.bus.limits:
-        least = plain(limit.value(network)) + plain(limit.uncertainty(network))
-        found[f"limit {limit.key}"] = least - plain(limit.most(network))
+        least = limit.value(network) + limit.uncertainty(network)
+        found[f"limit {limit.key}"] = least - limit.most(network)
     for latency in cycle.latencies():
         # Each part and the total. A wait for the next frame or SYNC0 takes what the parts before it leave.
         found |= {
-            f"{latency.label} {key}": plain(us)
+            f"{latency.label} {key}": us
             for key, us in latency.phases.items()
             if key.endswith("_us") and not key.endswith(("_wait_us", "deadline_us"))
         }

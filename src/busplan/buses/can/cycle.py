@@ -51,7 +51,6 @@ from busplan.elementwise import (
     is_off,
     larger,
     named,
-    plain,
     pointwise,
     rounded_up,
     square_root,
@@ -135,7 +134,7 @@ class CanCycle(BusCycle):
     @property
     def rates(self) -> tuple[Rate, ...]:
         """The rate of each group; all count from the same SYNC."""
-        return tuple(Rate(int(plain(group.every))) for group in self.network.groups)
+        return tuple(Rate(int(group.every)) for group in self.network.groups)
 
     def at(self, number: int) -> "CanCycle":
         """A cycle of the common multiple of the rates; other messages are all there."""
@@ -292,7 +291,7 @@ class CanCycle(BusCycle):
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
-        waited = waits(self.traffic, plain(self._on_bus_us), self._due)
+        waited = waits(self.traffic, self._on_bus_us, self._due)
         for message in waited.blocks()[first:end]:
             yield blocking._replace(us=message.frame_us, label=f"message {message.name} of a lower priority")
 
@@ -499,10 +498,10 @@ class CanCycle(BusCycle):
     def card_lines(self, fits: Callable[[Network], bool]) -> tuple[tuple[str, str], ...]:
         """Load beside its limit, if there is one, and the message that comes closest to its deadline."""
         most = self.network.profile.most_load
-        words = f"{_short(100 * plain(self.load))} %" + (f", {_short(100 * most)} allowed" if most < 1 else "")
+        words = f"{_short(100 * self.load)} %" + (f", {_short(100 * most)} allowed" if most < 1 else "")
         if self.traffic.has_rates:
             fullest = self._in_cycle_us / self.traffic.period_us + self._messages_load
-            words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
+            words += f"; {_short(100 * fullest)} % with all PDOs in every cycle"
         lines = [("load", words)]
         if queues := self._queues():
             lines.append(("queues", queues))
@@ -515,7 +514,7 @@ class CanCycle(BusCycle):
             free = sum(message.deadline_us == NO_DEADLINE_US for message, _ in answers)
             others = f"; {plural(free, 'message')} without a deadline" if free and "without" not in words else ""
             lines.append(("latest message", f"{latest.name}, {words}{others}"))
-        possible_us = plain(self.possible_us())
+        possible_us = self.possible_us()
         if possible_us:
             why = "frames of a burst wait" if self.traffic.access == "burst" else "messages in queues wait"
             lines.append(("upper bound", f"{why} up to {_short(possible_us)} us; they may wait less"))
@@ -591,7 +590,7 @@ class CanCycle(BusCycle):
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The host's pipeline, and the period to the next SYNC."""
-        return super().loop_periods(at_sync=at_sync) + int(plain(self._pipeline))
+        return super().loop_periods(at_sync=at_sync) + int(self._pipeline)
 
     @property
     def _pipeline(self) -> Number:

@@ -11,7 +11,6 @@ from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c
 from busplan.buses.can.frames import SYNC, Stream, place, streams, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.recordings.can import written_bits
 from busplan.recordings.written import candump
@@ -83,7 +82,7 @@ class _Machine:
         emulation.require_few(sum(stream.identifiers * self.end_us / stream.period_us for stream in sent))
         self.senders = [sender for pair in zip(sent, unstuffed, strict=True) for sender in self._senders(*pair)]
         # After the last frame of a sender nobody knows whether one is missing.
-        cycles = range(emulation.cycles - int(max((plain(pdos.every) for pdos in self.traffic.pdos), default=1)))
+        cycles = range(emulation.cycles - int(max((pdos.every for pdos in self.traffic.pdos), default=1)))
         due = {name: [cycle for cycle in cycles if self._due(name, cycle)] for name in ("feedback", "command")}
         among = {SILENT: due["feedback"], TWICE: due["feedback"], LATE: due["command"]}
         self.hit = {fault: emulation.drawn(fault, among.get(fault, cycles)) for fault in FAULTS}
@@ -109,7 +108,7 @@ class _Machine:
                 flags = np.full(len(data), is_extended), np.zeros(len(data), dtype=np.bool_), np.full(len(data), size)
                 first = [int.from_bytes(part.ljust(int(c.FRAME_BYTES), b"\0"), "big") for part in data]
                 bits = written_bits(np.full(len(data), identifier), *flags, np.array(first, dtype=np.uint64))
-                wires_us = (bits * plain(bit_us(self.traffic.bit_rate_kbit_s))).tolist()
+                wires_us = (bits * bit_us(self.traffic.bit_rate_kbit_s)).tolist()
             name = f"{identifier:0{8 if is_extended else 3}X}{mark}"
             frames = [f"{name}{part.hex().upper()}" for part in data]
             yield _Sender(stream, place(identifier, stream.identifier_bits), list(zip(frames, wires_us, strict=True)))
@@ -128,7 +127,7 @@ class _Machine:
 
     def _alone(self) -> Iterator[_Queued]:
         """SYNCs and messages, which wait for no other frame."""
-        late_us, own_us = self.emulation.faults.get(JITTER.name, 0.0), plain(self.traffic.sync_jitter_us)
+        late_us, own_us = self.emulation.faults.get(JITTER.name, 0.0), self.traffic.sync_jitter_us
         for sender in self.senders:
             stream = sender.stream
             if stream.name == SYNC:
@@ -140,7 +139,7 @@ class _Machine:
             if stream.is_message:
                 due_us = self.random.uniform(0, stream.period_us * stream.burst)
                 while due_us < self.end_us:
-                    queued_us = due_us + self.random.uniform(0, plain(stream.jitter_us))
+                    queued_us = due_us + self.random.uniform(0, stream.jitter_us)
                     yield from (self._at(queued_us, sender, number) for number in range(int(stream.burst)))
                     due_us += stream.period_us * stream.burst
 
@@ -153,14 +152,14 @@ class _Machine:
             self.left[cycle] = len(feedback)
             for answer in feedback:
                 group = next(group for group in self.network.groups if group.name == answer.stream.group)
-                extra_us = self.random.uniform(0, plain(group.worst_extra_us))
-                yield self._at(now_us + plain(group.read_execution_us) + extra_us, answer, cycle)
+                extra_us = self.random.uniform(0, group.worst_extra_us)
+                yield self._at(now_us + group.read_execution_us + extra_us, answer, cycle)
         elif sender.stream.name == "feedback":
             self.left[cycle] -= 1
         else:
             return
         if not self.left[cycle]:
-            now_us += self.random.uniform(LEAST_SHARE, 1) * plain(self.traffic.host_us)
+            now_us += self.random.uniform(LEAST_SHARE, 1) * self.traffic.host_us
             late_us = self.emulation.faults.get(LATE.name, 0.0) * (cycle in self.hit[LATE])
             yield from (self._at(now_us + late_us, command, cycle) for command in self._due("command", cycle))
 
@@ -183,7 +182,7 @@ class _Machine:
             is_destroyed = bool(errors) and errors[0] * self.period_us <= now_us
             if is_destroyed:
                 del errors[0]
-                frame, wire_us = _ERROR, wire_us / 2 + plain(c.ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
+                frame, wire_us = _ERROR, wire_us / 2 + (c.ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
                 heappush(waiting, (sender.order, running, sender, number))
             now_us += wire_us
             if now_us >= self.end_us:
@@ -195,7 +194,7 @@ class _Machine:
 
 def _period_us(network: Network) -> float:
     traffic = traffic_of(network)
-    return plain(traffic.period_us if traffic.has_cycle else min(message.period_us for message in traffic.messages))
+    return traffic.period_us if traffic.has_cycle else min(message.period_us for message in traffic.messages)
 
 
 EMULATOR: Final = Emulator(FAULTS, (".log", ".candump"), _period_us, emulated)

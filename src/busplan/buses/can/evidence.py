@@ -8,7 +8,6 @@ from busplan.buses.can import equations
 from busplan.buses.can.equations import c
 from busplan.buses.can.frames import Message, Traffic, streams
 from busplan.buses.can.waiting import message_responses
-from busplan.elementwise import plain
 
 Stuffing = Literal["worst", "expected", "none"]
 """Number of stuff bits: the most, as many as measured frames have, or none."""
@@ -23,7 +22,7 @@ def stuffed(_cycle: object, *, least: float, most: float, stuffing: Stuffing) ->
 def frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, stuffing: Stuffing) -> float:
     """Length of a frame, the space of 3 bits behind it included [bits]."""
     least, most = (
-        plain(equations.frame_bits(payload_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed))
+        equations.frame_bits(payload_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
         for is_stuffed in (False, True)
     )
     return stuffed(cycle, least=least, most=most, stuffing=stuffing)
@@ -32,7 +31,7 @@ def frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, stuff
 def fd_frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, stuffing: Stuffing) -> float:
     """Length of a CAN FD frame at both bit rates, the space of 3 bits behind it included [bits]."""
     least, most = (
-        plain(sum(equations.fd_frame_bits(payload_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)))
+        sum(equations.fd_frame_bits(payload_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed))
         for is_stuffed in (False, True)
     )
     return stuffed(cycle, least=least, most=most, stuffing=stuffing)
@@ -43,7 +42,7 @@ def response_us(
 ) -> float | None:
     """Worst-case response time of a message, counted from 1 in the order of identifiers [us]; None without an end."""
     _, worst = message_responses(_messages(bit_rate_kbit_s, payload_bytes, period_us))[message - 1]
-    return None if worst.us == inf else plain(worst.us)
+    return None if worst.us == inf else worst.us
 
 
 def load(_cycle: object, *, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> float:

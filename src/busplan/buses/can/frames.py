@@ -15,7 +15,7 @@ from busplan.buses.can.equations import (
     share_bytes,
 )
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, larger, plain, pointwise, smaller, total
+from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, larger, pointwise, smaller, total
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 from busplan.sourced import cached
 
@@ -606,7 +606,7 @@ def _most_bytes(pdos: Pdos) -> Iterator[int]:
 
 def frame_sizes(pdos: Pdos) -> Iterator[int]:
     """Data of each frame of a PDO of plain numbers, of which there may be billions [bytes]."""
-    left_bytes = int(plain(pdos.payload_bytes))
+    left_bytes = int(pdos.payload_bytes)
     for most_bytes in _most_bytes(pdos):
         if left_bytes <= 0:
             return

@@ -18,7 +18,6 @@ from busplan.buses.can.rules import LIMITS, RULES
 from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 
@@ -52,7 +51,7 @@ def _identifier_bits(network: Network) -> Setting:
     """Identifiers of 11 bits, where all are small enough."""
     key, traffic = "bus.identifier_bits", traffic_of(network)
     last = [stream.last for stream in streams(traffic) if stream.identifier_bits == traffic.identifier_bits]
-    is_larger = plain(traffic.identifier_bits) != BASE_BITS
+    is_larger = traffic.identifier_bits != BASE_BITS
     values = ({key: BASE_BITS},) if is_larger and last and max(last) <= MAX_IDENTIFIER[BASE_BITS] else ()
     return Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), values)
 
@@ -196,7 +195,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to four frames of each PDO."""
         most_bytes = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
-        axes = (int(plain(group.axes)) for group in network.groups if group.payload.pdo_per == "axis")
+        axes = (int(group.axes) for group in network.groups if group.payload.pdo_per == "axis")
         return PayloadRange(1, most_bytes * max(min(axes, default=1), 1), carrier="four frames")
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
@@ -208,7 +207,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         bus = network.profile.bus
         data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
         seldom = (
-            f"PDOs {nodes.name and f'of {nodes.name} '}every {int(plain(nodes.payload.every))} cycles"
+            f"PDOs {nodes.name and f'of {nodes.name} '}every {int(nodes.payload.every)} cycles"
             for nodes in network.profile.node_groups
             if nodes.payload.every > 1
         )

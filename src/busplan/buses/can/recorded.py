@@ -15,7 +15,6 @@ from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_
 from busplan.buses.can.frames import SYNC, Stream, streams
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
-from busplan.elementwise import plain
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -166,7 +165,7 @@ class _Log:
         self.network, self.frames, self.share = network, frames, share
         self.cycle = CanCycle(network, WORST)
         self.traffic = self.cycle.traffic
-        self.bit_us = plain(bit_us(self.traffic.bit_rate_kbit_s))
+        self.bit_us = bit_us(self.traffic.bit_rate_kbit_s)
         self.edits: dict[str, Any] = {}
         self.stretch = longest_stretch(frames)
         self.taken, self.times_us = self.stretch.taken, self.stretch.times_us
@@ -199,7 +198,7 @@ class _Log:
             yield RecordedFigure(
                 "bit rate that the frames need",
                 "kbit/s",
-                plain(self.traffic.bit_rate_kbit_s),
+                self.traffic.bit_rate_kbit_s,
                 least.likely,
                 (least.likely - least.surely) / SURE,
                 "at most",
@@ -232,7 +231,7 @@ class _Log:
             yield "all frames have one stamp"
         elif reason := stamps_of_no_bus(self.least_bit_rate.likely):
             yield reason
-        period_us = plain(self.traffic.period_us)
+        period_us = self.traffic.period_us
         if self.traffic.has_cycle and 2 * self.step_us > period_us:
             yield f"its stamps have steps of {self.step_us:,.0f} us, and a cycle lasts {period_us:,.0f}"
 
@@ -246,7 +245,7 @@ class _Log:
         """Each frame on the wire with the most stuff bits or with none [us]."""
         taken = self.taken
         us = np.zeros(len(taken))
-        nominal, data = plain(self.traffic.bit_rate_kbit_s), plain(self.traffic.data_bit_rate_kbit_s)
+        nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
         is_fd, switched = self.frames.is_fd[taken], self.frames.switched[taken]
         # Without a data bit rate the frames that switch take no time.
         for places, data_rate in ((~is_fd, 0.0), (is_fd & ~switched, nominal), (is_fd & switched & bool(data), data)):
@@ -280,7 +279,7 @@ class _Log:
         stuffing_us = (worst_us - none_us)[1:][is_fd[1:]].sum() / 2
         doubt = float(more_us + load * self.stamp_error_us + stuffing_us) / span_us
         note = "mean; exact bits of each classical frame, at the bit rate of the profile"
-        planned = plain(self.cycle.load)
+        planned = self.cycle.load
         if is_whole:
             yield RecordedFigure("load", "share", planned, load, doubt, "at most", count, note=note)
         else:
@@ -333,13 +332,9 @@ class _Log:
                 "last PDO after SYNC",
                 "us",
                 # From a SYNC as it came, late or not.
-                _finite(
-                    plain(self.cycle.required_us)
-                    - plain(self.network.nonperiodic_us)
-                    - plain(self.traffic.sync_jitter_us)
-                ),
+                _finite(self.cycle.required_us - self.network.nonperiodic_us - self.traffic.sync_jitter_us),
                 behind.value,
-                self._with_stamps(*(plain(doubt.us) for doubt in self.cycle.doubts()), behind.uncertainty or 0.0),
+                self._with_stamps(*(doubt.us for doubt in self.cycle.doubts()), behind.uncertainty or 0.0),
                 "at most",
                 len(behind_us),
                 "cycle.period_us",
@@ -386,7 +381,7 @@ class _Log:
 
     def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
         """Period of SYNC, equal to that of the plan, and its jitter."""
-        periods, planned_us, count = periodic_events(sent.times_us), plain(stream.period_us), len(sent.times_us)
+        periods, planned_us, count = periodic_events(sent.times_us), stream.period_us, len(sent.times_us)
         period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, "cycle.period_us")
         if periods is None:
             yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
@@ -409,7 +404,7 @@ class _Log:
         self, stream: Stream, label: str, recorded: Sequence[SentFrames], spread_us: float | None
     ) -> Iterator[RecordedFigure]:
         """Mean distance of a message, and how much sooner it comes than its period; of the identifier that is worst."""
-        key, planned_us = f"message.{stream.name}", plain(stream.period_us)
+        key, planned_us = f"message.{stream.name}", stream.period_us
         repeated = [sent for sent in recorded if len(sent.times_us) > 1]
         if not repeated:
             return
@@ -427,7 +422,7 @@ class _Log:
         scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
         if mean.uncertainty is not None:
             # A plan with bursts or jitter allows a row of frames that is so much faster.
-            allowed_us = (stream.burst - 1) * planned_us + plain(stream.jitter_us)
+            allowed_us = (stream.burst - 1) * planned_us + stream.jitter_us
             scatter_us = max(mean.uncertainty, allowed_us / (count - 1) / 2)
         doubt_us = expanded(scatter_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
         period = RecordedFigure(
@@ -476,7 +471,7 @@ class _Log:
         if phases is None or not (stream.is_message or stream.name == SYNC):
             return None
         together_us = (stream.burst - 1) * stream.period_us
-        return _finite(max(plain(phases["worst_response_us"]) - shortest_us, 0.0) + together_us)
+        return _finite(max(phases["worst_response_us"] - shortest_us, 0.0) + together_us)
 
     def remarks(self) -> Iterator[str]:
         """What the log has beside the figures."""

@@ -20,10 +20,10 @@ from busplan.buses.can.frames import (
     traffic_of,
 )
 from busplan.buses.can.waiting import message_responses
-from busplan.buses.limits import NODE_LIMIT, Limit
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, choose, larger, plain, pointwise, smaller, total, within
+from busplan.elementwise import Number, choose, larger, pointwise, smaller, total, within
 from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US
 
@@ -32,21 +32,6 @@ def _late_messages(traffic: Traffic) -> list[tuple[Stream, float]]:
     """Messages of plain numbers that miss their deadline, in the order of the profile, with their response [us]."""
     answers = message_responses(traffic, is_verdict=True)
     return [(message, worst.us) for message, worst in answers if not within(worst.us, message.deadline_us)]
-
-
-def _deadline_words(network: Network) -> str:
-    """Say of all messages that miss their deadline in one clause, the worst first."""
-    late = sorted(_late_messages(traffic_of(network).longest), key=lambda pair: -pair[1] / pair[0].deadline_us)
-    endless = [message.name for message, us in late if us == inf]
-    if endless:
-        return f"{first_of(endless, 1)} ha{'s' if len(endless) == 1 else 've'} no worst-case response time"
-    return first_of(
-        [
-            f"the worst-case response time of {message.name} is {us:g} us, over its {message.deadline_us:g} us"
-            for message, us in late
-        ],
-        1,
-    )
 
 
 def _slowest(traffic: Traffic) -> Number:
@@ -66,22 +51,6 @@ _ENDLESS: Final = 1e6
 """Response over deadline, from which on how late a message is says nothing [1]."""
 
 
-def _deadline(network: Network) -> Number:
-    share = _slowest(traffic_of(network).longest)
-    return choose(share < _ENDLESS, share, inf)
-
-
-def _late_part(network: Network) -> Number:
-    """Part of that which is only possible: what FD frames take in addition, and all that queues add to J + C [1]."""
-    traffic = traffic_of(network)
-    if not traffic.queues and traffic.longest is traffic:
-        return 0.0
-    most, surely = _slowest(traffic.longest), _slowest(traffic)
-    if traffic.queues:
-        surely = traffic.ask(_own_share, words="J + C over D of all messages")
-    return choose(most < _ENDLESS, most - surely, choose(surely < _ENDLESS, inf, 0.0))
-
-
 def _own_share(traffic: Traffic) -> Number:
     """The largest J + C over deadline of any message, whatever it waits for [1]."""
     messages = [stream for stream in streams(traffic) if stream.is_message]
@@ -98,20 +67,16 @@ def _unknown_senders(network: Network) -> list[str]:
     return [message.name for message in profile.message if message.sender is None and not message.per_node]
 
 
-def _senders_words(network: Network) -> str:
-    return f"{first_of(_unknown_senders(network), 3)}: who sends it is not known, so neither what waits in its queue"
-
-
-def _kept_from_us(network: Network, *, is_shown: bool) -> float:
+def _kept_from_us(network: Network) -> float:
     """The period from which on deadlines are kept; infinite where none is long enough, or without a cycle [us]."""
 
     def is_kept(period_us: float) -> bool:
         traffic = traffic_of(network._replace(period_us=period_us))
-        return bool(within(_slowest(traffic.longest if is_shown else traffic), 1))
+        return bool(within(_slowest(traffic.longest), 1))
 
     if not traffic_of(network).has_cycle:
         return inf
-    broken_us = kept_us = plain(network.period_us)
+    broken_us = kept_us = network.period_us
     while not is_kept(kept_us):
         broken_us, kept_us = kept_us, 2 * kept_us
         if kept_us > MAX_TIME_US:
@@ -205,7 +170,7 @@ def _payload_words(network: Network) -> str:
     frames = (
         f"{over.name}_pdos" if len(over.frame_bytes) > 1 or over.most_bytes == over.frame_bytes[0] else "four frames"
     )
-    return f"a PDO of {plain(over.payload_bytes):.0f} bytes is over the {over.most_bytes} bytes of {frames}"
+    return f"a PDO of {over.payload_bytes:.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 
 def _longest(network: Network) -> CanCycle:
@@ -213,23 +178,9 @@ def _longest(network: Network) -> CanCycle:
     return CanCycle(network, WORST, traffic=traffic_of(network).longest)
 
 
-def _late_load(network: Network) -> Number:
-    """Part of the load that the bits that FD frames may take in addition make [1]."""
-    return _longest(network).load - CanCycle(network, WORST).load
-
-
 def _when_full(load: float) -> str:
     """Say of a load what comes of it, where it is 1 or more."""
     return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
-
-
-_LOAD: Final = "the bus load with the longest bits"
-
-
-def _load_words(network: Network) -> str:
-    load, most = plain(_longest(network).load), network.profile.most_load
-    over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
-    return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
 
 
 def _pdos(network: Network) -> Number:
@@ -237,33 +188,149 @@ def _pdos(network: Network) -> Number:
     return total(pdos.pdos for pdos in traffic_of(network).pdos if pdos.kind == "read")
 
 
-def _assumed_periods(network: Network) -> int:
-    """Messages whose period is assumed."""
-    return sum(message.period_grade == "assumed" for message in network.profile.message)
+_LOAD: Final = "the bus load with the longest bits"
 
 
-def _periods_words(network: Network) -> str:
-    names = [message.name for message in network.profile.message if message.period_grade == "assumed"]
-    return f"the period of {first_of(names, 3)} is assumed: give what their specification or a log says"
+class Load(Limit):
+    """All messages together must not take more of the bus than the plan allows."""
+
+    key = "load"
+    way_out = "a longer period, fewer bytes or a faster bus takes load off"
+    has_rule = True
+    has_period = True
+
+    def value(self, network: Network) -> Number:
+        """The load with FD frames and bits as long as they may be [1]."""
+        return _longest(network).load
+
+    def most(self, network: Network) -> Number:
+        """limits.max_load [1]."""
+        return network.profile.most_load
+
+    def perhaps(self, network: Network) -> Number:
+        """Load of the bits that FD frames may take in addition [1]."""
+        return self.value(network) - CanCycle(network, WORST).load
+
+    def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:  # noqa: ARG002 - the longest bits count
+        """The period at which the load is the largest allowed [us]."""
+        return _longest(network).load_period_us
+
+    def words(self, network: Network) -> str:
+        """The load, the most, and what comes of a full bus."""
+        load, most = self.value(network), network.profile.most_load
+        over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
+        return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
+
+
+class KnownPeriods(Limit):
+    """Deadlines are shown to be kept only where no period of a message is assumed."""
+
+    key = "periods"
+    way_out = "give message.NAME.period_us as it is known"
+    place = "message"
+    of_deadlines = True
+
+    def value(self, network: Network) -> Number:
+        """Messages whose period is assumed [1]."""
+        return sum(message.period_grade == "assumed" for message in network.profile.message)
+
+    def most(self, _network: Network) -> Number:
+        """0."""
+        return 0
+
+    def perhaps(self, network: Network) -> Number:
+        """All of them: the assumption may hold [1]."""
+        return self.value(network)
+
+    def words(self, network: Network) -> str:
+        """Their names."""
+        names = [message.name for message in network.profile.message if message.period_grade == "assumed"]
+        return f"the period of {first_of(names, 3)} is assumed: give what their specification or a log says"
+
+
+class KnownSenders(Limit):
+    """Deadlines are shown to be kept only where the sender of each message is known, if queues are not by priority."""
+
+    key = "senders"
+    way_out = "give message.NAME.sender"
+    place = "bus.queue"
+    of_deadlines = True
+
+    def value(self, network: Network) -> Number:
+        """Messages without a sender [1]."""
+        return len(_unknown_senders(network))
+
+    def most(self, _network: Network) -> Number:
+        """0."""
+        return 0
+
+    def perhaps(self, network: Network) -> Number:
+        """All of them: nothing may wait in their queues [1]."""
+        return self.value(network)
+
+    def words(self, network: Network) -> str:
+        """Their names."""
+        names = first_of(_unknown_senders(network), 3)
+        return f"{names}: who sends it is not known, so neither what waits in its queue"
+
+
+class Deadlines(Limit):
+    """No message may take longer than its deadline."""
+
+    key = "deadline"
+    way_out = "a smaller identifier, or less traffic before it, makes a message earlier"
+    has_rule = True
+    has_period = True
+    is_slow = True
+    of_deadlines = True
+
+    def value(self, network: Network) -> Number:
+        """The largest response over deadline of any message; infinite where it is without end [1]."""
+        share = _slowest(traffic_of(network).longest)
+        return choose(share < _ENDLESS, share, inf)
+
+    def most(self, _network: Network) -> Number:
+        """1."""
+        return 1
+
+    def perhaps(self, network: Network) -> Number:
+        """Part of that which FD frames may take in addition, and of all that queues add to J + C [1]."""
+        traffic = traffic_of(network)
+        if not traffic.queues and traffic.longest is traffic:
+            return 0.0
+        most, surely = _slowest(traffic.longest), _slowest(traffic)
+        if traffic.queues:
+            surely = traffic.ask(_own_share, words="J + C over D of all messages")
+        return choose(most < _ENDLESS, most - surely, choose(surely < _ENDLESS, inf, 0.0))
+
+    def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:  # noqa: ARG002 - the longest bits count
+        """The period from which on deadlines are kept [us]."""
+        return _kept_from_us(network)
+
+    def words(self, network: Network) -> str:
+        """All messages that miss their deadline in one clause, the worst first."""
+        late = sorted(_late_messages(traffic_of(network).longest), key=lambda pair: -pair[1] / pair[0].deadline_us)
+        endless = [message.name for message, us in late if us == inf]
+        if endless:
+            return f"{first_of(endless, 1)} ha{'s' if len(endless) == 1 else 've'} no worst-case response time"
+        each = (
+            f"the worst-case response time of {message.name} is {us:g} us, over its {message.deadline_us:g} us"
+            for message, us in late
+        )
+        return first_of([*each], 1)
 
 
 LIMITS: Final = (
     NODE_LIMIT,
-    Limit(
+    ExactLimit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
         _pdos,
         lambda _network: c.MOST_NODES,
         way_out="a second bus has {most:g} more",
     ),
-    Limit(
-        "payload",
-        _payload_words,
-        _largest_pdo,
-        _least_room,
-        way_out="a smaller payload would do",
-    ),
-    Limit(
+    ExactLimit("payload", _payload_words, _largest_pdo, _least_room, way_out="a smaller payload would do"),
+    ExactLimit(
         "range",
         "identifier {value:.0f} is over {most:.0f}, the largest of {bus.identifier_bits} bits",
         _largest_identifier,
@@ -271,7 +338,7 @@ LIMITS: Final = (
         way_out="smaller identifiers, or those of 29 bits, have room",
         is_slow=True,
     ),
-    Limit(
+    ExactLimit(
         "identifiers",
         lambda network: first_of([words for _, words in _collision_words(network)], 1),
         _identifiers_twice,
@@ -280,55 +347,17 @@ LIMITS: Final = (
         has_rule=True,
         is_slow=True,
     ),
-    Limit(
-        "load",
-        _load_words,
-        lambda network: _longest(network).load,
-        lambda network: network.profile.most_load,
-        way_out="a longer period, fewer bytes or a faster bus takes load off",
-        perhaps=_late_load,
-        period=lambda limit, network: (CanCycle(network, WORST) if limit.perhaps else _longest(network)).load_period_us,
-        has_rule=True,
-    ),
-    Limit(
-        "periods",
-        _periods_words,
-        _assumed_periods,
-        lambda _network: 0,
-        perhaps=_assumed_periods,
-        way_out="give message.NAME.period_us as it is known",
-        place="message",
-        of_deadlines=True,
-    ),
-    Limit(
-        "senders",
-        _senders_words,
-        lambda network: len(_unknown_senders(network)),
-        lambda _network: 0,
-        perhaps=lambda network: len(_unknown_senders(network)),
-        way_out="give message.NAME.sender",
-        place="bus.queue",
-        of_deadlines=True,
-    ),
-    Limit(
-        "deadline",
-        _deadline_words,
-        _deadline,
-        lambda _network: 1,
-        way_out="a smaller identifier, or less traffic before it, makes a message earlier",
-        perhaps=_late_part,
-        period=lambda limit, network: _kept_from_us(network, is_shown=limit.perhaps is None),
-        has_rule=True,
-        is_slow=True,
-        of_deadlines=True,
-    ),
+    Load(),
+    KnownPeriods(),
+    KnownSenders(),
+    Deadlines(),
 )
 
 
 def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
     if "load" in (*subject.deciding.exceeded, *(subject.deciding.not_shown or ())):
-        load, most = plain(_longest(subject.network).load), subject.network.profile.most_load
+        load, most = _longest(subject.network).load, subject.network.profile.most_load
         yield RuleProblem(
             "limits.max_load", f"{_LOAD} is {load:.1%}, {most:.1%} allowed{_when_full(load)}", *subject.cure()
         )

@@ -21,7 +21,7 @@ from busplan.buses.can.frames import (
     repeated_by_place,
     streams,
 )
-from busplan.elementwise import choose, is_everywhere, is_off, larger, plain, smaller, total
+from busplan.elementwise import choose, is_everywhere, is_off, larger, smaller, total
 from busplan.english import first_of
 from busplan.sourced import cached
 
@@ -515,7 +515,7 @@ def _searched(
         )
     for place, number in enumerate(answered):
         blocked_us, late, wait_us, us = (_points(result, place, shape) for result in results)
-        instance = (late if shape else int(plain(late))) + sent[number].burst - 1
+        instance = (late if shape else int(late)) + sent[number].burst - 1
         interference_us = wait_us - blocked_us - instance * sent[number].frame_us
         yield number, Response(blocked_us, instance, interference_us, us)
 

@@ -38,7 +38,7 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network, Rate
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, larger, named, plain, rounded_up, square_root, total
+from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, step, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
@@ -121,15 +121,16 @@ class EthercatCycle(BusCycle):
         return packing(self.network, self._devices)
 
     @cached_property
+    @step("D")
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(group.number * group.data_bytes for group in self._devices), "process_bytes", "D")
+        return total(group.number * group.data_bytes for group in self._devices)
 
     @cached_property
     def _overhead_bytes(self) -> Number:
         packed = self.packing
         headers = packed.datagrams_bytes - self.process_bytes
-        return packed.frames * overhead_bytes(packed.frames) + headers + packed.padding_bytes
+        return packed.frames * overhead_bytes() + headers + packed.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:
@@ -186,24 +187,24 @@ class EthercatCycle(BusCycle):
 
     def _frames(self) -> Iterator[BusEvent]:
         """Each frame: its overhead, then the data of each device in it."""
-        sizes = [plain(group.data_bytes) for group in self._devices for _ in range(int(plain(group.number)))]
+        sizes = [group.data_bytes for group in self._devices for _ in range(int(group.number))]
         number = 0
         for run in frames(self.network, self._devices):
             for carried in run.by_frame():
                 number += 1
-                overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in carried)
-                us, label = plain(sending_us(overhead)), f"headers of frame {number}"
+                overhead = frame_bytes(run.datagrams_bytes) - sum(sizes[device - 1] for device in carried)
+                us, label = sending_us(overhead), f"headers of frame {number}"
                 yield BusEvent("overhead", "cycle_frames_us", us, label, None, "frame")
                 for device in carried:
-                    us = plain(sending_us(sizes[device - 1]))
+                    us = sending_us(sizes[device - 1])
                     yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
         """The path of the last byte to each device and through it, and back."""
         way, device = [], 0
         for group in self.network.groups:
-            to_us, through_us = plain(cable_us(group.node.cable_length_m)) / 2, plain(hop_us(group)) / 2
-            for _ in range(int(plain(group.nodes))):
+            to_us, through_us = cable_us(group.node.cable_length_m) / 2, hop_us(group) / 2
+            for _ in range(int(group.nodes)):
                 device += 1
                 way += [
                     BusEvent("cable", "cycle_cable_us", to_us, f"cable to device {device}", device, "way"),
@@ -230,7 +231,7 @@ class EthercatCycle(BusCycle):
         cycles = cycles_of(self.network)
         names = (group.name for group, is_due in zip(self.network.groups, cycles[0].due, strict=True) if is_due)
         shown, number = ", ".join(names) or "no group", sum(len(cycle.numbers) for cycle in cycles)
-        mean_us, given_us = plain(self._mean_us), plain(self._given_us)
+        mean_us, given_us = self._mean_us, self._given_us
         return (
             ("fullest cycle", f"has {shown}; {len(cycles[0].numbers)} of {number} cycles are so"),
             ("mean cycle", f"{mean_us:.1f} us, {mean_us / given_us:.0%}".replace("%", " %")),
@@ -265,37 +266,37 @@ class EthercatCycle(BusCycle):
             Number of the device, from 1.
         """
         network = self.network
-        sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
+        sent_us = network.profile.bus.master_us + network.profile.bus.master_jitter_us
         for run in frames(network, devices(network)):
-            frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), node - run.first
+            frame_us, before = sending_us(frame_bytes(run.datagrams_bytes)), node - run.first
             if before < run.devices * run.frames:
                 sent_us += (before // run.devices + 1) * frame_us
                 break
             sent_us += run.frames * frame_us
         way_us, left = 0.0, node
         for group in network.groups:
-            passed = min(left, int(plain(group.nodes)))
-            way_us += passed * plain(hop_us(group) + cable_us(group.node.cable_length_m)) / 2
+            passed = min(left, int(group.nodes))
+            way_us += passed * (hop_us(group) + cable_us(group.node.cable_length_m)) / 2
             left -= passed
-        return sent_us + way_us
+        return float(sent_us + way_us)
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The master's pipeline, and the periods that feedback waits for a frame and a command for SYNC0 [1].
 
         The slowest group counts; groups at slower rates are left out.
         """
-        network, period_us = self.network, plain(self.network.period_us)
-        shift_us = plain(sync0_us(network)) if at_sync else 0.0
-        last_us = self.arrival_us(int(plain(network.nodes)))
+        network, period_us = self.network, self.network.period_us
+        shift_us = sync0_us(network) if at_sync else 0.0
+        last_us = self.arrival_us(int(network.nodes))
 
         def waits(group: Group) -> float:
-            extra_us = plain(group.worst_extra_us)
-            sampled = plain(_until_taken((shift_us + plain(group.read_execution_us) + extra_us) / period_us))
-            late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
-            return sampled + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
+            extra_us = group.worst_extra_us
+            sampled = _until_taken((shift_us + group.read_execution_us + extra_us) / period_us)
+            late_us = last_us + group.write_execution_us + extra_us - shift_us
+            return sampled + (max(rounded_up(late_us / period_us), 0) if at_sync else 0)
 
         groups = [group for group in network.groups if not group.is_slower] or network.groups
-        return int(max(map(waits, groups)) + plain(network.profile.bus.pipeline_cycles))
+        return int(max(map(waits, groups)) + network.profile.bus.pipeline_cycles)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst case of a command, of feedback, and of a loop over both, for each group."""
@@ -333,16 +334,17 @@ class EthercatCycle(BusCycle):
         return process_us(self.network, devices(self.network))
 
     @cached_property
+    @step("way")
     def _way_us(self) -> Number:
         """Delay of devices and cables to the last device and back [us]."""
-        return named(devices_us(self.network) + cables_us(self.network), "way_us", "way")
+        return devices_us(self.network) + cables_us(self.network)
 
+    @step("t_cmd", "command_us")
     def _taken_us(self, group: Group) -> Number:
         """Latest time at which a group has taken its command, as if at the end of the segment [us]."""
         bus = self.network.profile.bus
         on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
-        taken_us = on_wire_us + group.write_execution_us + group.worst_extra_us
-        return named(taken_us, "command_us", "t_cmd")
+        return on_wire_us + group.write_execution_us + group.worst_extra_us
 
     def _command(self, group: Group) -> dict[str, Number]:
         """Phases of a command: from the cycle with the feedback it is computed from, to its effect."""

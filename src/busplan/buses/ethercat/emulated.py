@@ -16,7 +16,6 @@ from busplan.buses.ethercat.equations import (
 )
 from busplan.buses.ethercat.frames import cables_us, data_bytes, devices_at, devices_us, frames, layout, rates
 from busplan.buses.network import Network, hyperperiod
-from busplan.elementwise import plain
 from busplan.recordings.capture import ETHERNET
 from busplan.recordings.ethercat import COMMANDS, LOGICAL
 from busplan.recordings.written import SYNTHETIC_PORT, pcapng
@@ -83,9 +82,9 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     BusplanError
         Too many frames.
     """
-    numbers, polls = range(1, hyperperiod(rates(network)) + 1), int(plain(network.profile.bus.mailbox_polls))
+    numbers, polls = range(1, hyperperiod(rates(network)) + 1), int(network.profile.bus.mailbox_polls)
     cycles = [tuple(_cycle(network, number)) for number in numbers]
-    filled = [any(plain(entry.data_bytes) for entry in devices_at(network, number)) for number in numbers]
+    filled = [any(entry.data_bytes for entry in devices_at(network, number)) for number in numbers]
     emulation.require_few(2 * emulation.cycles * (sum(map(len, cycles)) / len(cycles) + polls))
     due = [cycle for cycle in range(emulation.cycles - len(cycles)) if filled[cycle % len(cycles)]]
     packets = sorted(_packets(network, emulation, cycles, due), key=lambda packet: packet[0])
@@ -97,19 +96,19 @@ def _packets(
 ) -> Iterator[tuple[int, bytes]]:
     """Stamps [ns] and packets, each sent one before its return; faults hit the last frame of a cycle that is due."""
     bus, random = network.profile.bus, emulation.random
-    jitter_us, bias_us = plain(bus.master_jitter_us), plain(c.BYTE_BIAS_US)
-    nodes, way_us = int(plain(network.nodes)), plain(devices_us(network)) + plain(cables_us(network))
+    jitter_us, bias_us = bus.master_jitter_us, c.BYTE_BIAS_US
+    nodes, way_us = int(network.nodes), devices_us(network) + cables_us(network)
     missing, lost, wrong, late = (emulation.drawn(fault, due) for fault in FAULTS)
     free_ns = 0.0
     for cycle in range(emulation.cycles):
         late_us = jitter_us + emulation.faults[JITTER.name] if cycle in late else random.random() * jitter_us
-        back_us, of_cycle = way_us + random.uniform(LEAST_SHARE, 1) * plain(bus.master_us), cycles[cycle % len(cycles)]
+        back_us, of_cycle = way_us + random.uniform(LEAST_SHARE, 1) * bus.master_us, cycles[cycle % len(cycles)]
         # From a whole nanosecond on, so that stamps make no time longer than it is.
-        sent_ns: float = int(max(1000 * (cycle * plain(network.period_us) + late_us), free_ns))
+        sent_ns: float = int(max(1000 * (cycle * network.period_us + late_us), free_ns))
         for number, frame in enumerate((*of_cycle, *_polls(network, cycle)) if cycle not in missing else (), start=1):
             data = [random.randbytes(part.size) if part.is_logical else b"" for part in frame]
             yield int(sent_ns), _packet(frame, data, cycle)
-            sent_ns = free_ns = sent_ns + 1000 * plain(sending_us(frame_bytes(sum(map(_bytes, frame)))))
+            sent_ns = free_ns = sent_ns + 1000 * sending_us(frame_bytes(sum(map(_bytes, frame))))
             back_us += bias_us * sum(part.size for part in frame if part.is_logical and part.address != _MAILBOXES)
             is_last = number == len(of_cycle)
             if not (is_last and cycle in lost):
@@ -141,10 +140,10 @@ def _cycle(network: Network, number: int) -> Iterator[_Frame]:
     places: list[tuple[int, int, int]] = []  # of each device its inputs, its outputs, and its logical address
     address = _IMAGE
     for group, rate in zip(network.groups, rates(network), strict=True):
-        both = int(plain(group.read_bytes)), int(plain(group.write_bytes))
-        for _ in range(int(plain(group.nodes))):
+        both = int(group.read_bytes), int(group.write_bytes)
+        for _ in range(int(group.nodes)):
             places.append((*(both if rate.is_due(number) else (0, 0)), address))
-            address += int(plain(data_bytes(group, network)))
+            address += int(data_bytes(group, network))
     parts = tuple(_own(network))
     for run in frames(network, devices_at(network, number)):
         for carried in run.by_frame():
@@ -178,7 +177,7 @@ def _process(devices: Sequence[tuple[int, int, int]], layout_name: str) -> _Fram
 
 def _own(network: Network) -> Iterator[_Datagram]:
     """Datagrams that the master adds to the first frame."""
-    bus, nodes = network.profile.bus, int(plain(network.nodes))
+    bus, nodes = network.profile.bus, int(network.nodes)
     master = bus.master or UNNAMED
     if bus.housekeeping_bytes is not None:
         yield from (_Datagram("NOP", 0, int(size), 0) for size in bus.housekeeping_bytes)
@@ -195,9 +194,9 @@ def _own(network: Network) -> Iterator[_Datagram]:
 
 def _polls(network: Network, cycle: int) -> Iterator[_Frame]:
     """Mailbox polls of a cycle, of one device after the other; all are empty."""
-    polls, size = (int(plain(getattr(network.profile.bus, f"mailbox_{key}"))) for key in ("polls", "bytes"))
+    polls, size = (int(getattr(network.profile.bus, f"mailbox_{key}")) for key in ("polls", "bytes"))
     for poll in range(cycle * polls, (cycle + 1) * polls):
-        yield (_Datagram("FPRD", _MAILBOX | _STATION + poll % int(plain(network.nodes)), size, 0),)
+        yield (_Datagram("FPRD", _MAILBOX | _STATION + poll % int(network.nodes), size, 0),)
 
 
-EMULATOR: Final = Emulator(FAULTS, (".pcapng",), lambda network: plain(network.period_us), emulated)
+EMULATOR: Final = Emulator(FAULTS, (".pcapng",), lambda network: network.period_us, emulated)

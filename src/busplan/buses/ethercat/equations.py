@@ -6,7 +6,7 @@ from typing import Final, Literal
 
 from busplan.buses.figure import BusFigures, read_figures
 from busplan.buses.published import Spread, published, rows_of
-from busplan.elementwise import Number, choose, larger, plain, traced_with
+from busplan.elementwise import Number, choose, larger
 from busplan.sourced import Constants
 
 Port = Literal["100BASE-TX", "E-bus"]
@@ -54,20 +54,15 @@ def datagram_bytes(data_bytes: Number) -> Number:
     return data_bytes + c.DATAGRAM_BYTES
 
 
-def overhead_bytes(like: Number) -> Number:
+def overhead_bytes() -> Number:
     """Bytes of a frame on the wire without datagrams and padding: preamble, headers, check and gap [bytes].
-
-    Parameters
-    ----------
-    like
-        A number whose sort the result takes: float, array or traced.
 
     Examples
     --------
-    >>> overhead_bytes(1)
+    >>> overhead_bytes()
     40.0
     """
-    return traced_with(c.PREAMBLE_BYTES, like) + c.ETHERNET_BYTES + c.HEADER_BYTES + c.CHECK_BYTES + c.GAP_BYTES
+    return c.PREAMBLE_BYTES + c.ETHERNET_BYTES + c.HEADER_BYTES + c.CHECK_BYTES + c.GAP_BYTES
 
 
 def padding_bytes(datagrams_bytes: Number) -> Number:
@@ -83,7 +78,7 @@ def padding_bytes(datagrams_bytes: Number) -> Number:
     >>> padding_bytes(20), padding_bytes(100), padding_bytes(0)
     (24.0, 0.0, 0.0)
     """
-    short: Number = larger(c.LEAST_FRAME_BYTES - (datagrams_bytes + overhead_bytes(datagrams_bytes)), 0.0)
+    short: Number = larger(c.LEAST_FRAME_BYTES - (datagrams_bytes + overhead_bytes()), 0.0)
     return choose(datagrams_bytes > 0, short, 0.0)
 
 
@@ -100,7 +95,7 @@ def frame_bytes(datagrams_bytes: Number) -> Number:
     >>> frame_bytes(datagram_bytes(125)), frame_bytes(datagram_bytes(1)), frame_bytes(datagram_bytes(1486))
     (177.0, 84.0, 1538.0)
     """
-    return datagrams_bytes + overhead_bytes(datagrams_bytes) + padding_bytes(datagrams_bytes)
+    return datagrams_bytes + overhead_bytes() + padding_bytes(datagrams_bytes)
 
 
 def room_bytes(datagrams: int) -> float:
@@ -116,7 +111,7 @@ def room_bytes(datagrams: int) -> float:
     >>> room_bytes(1), room_bytes(2)
     (1486.0, 1474.0)
     """
-    return plain(c.MOST_FRAME_BYTES - plain(overhead_bytes(1)) - datagrams * c.DATAGRAM_BYTES)
+    return c.MOST_FRAME_BYTES - overhead_bytes() - datagrams * c.DATAGRAM_BYTES
 
 
 def sending_us(wire_bytes: Number) -> Number:

@@ -32,14 +32,13 @@ from busplan.elementwise import (
     is_off,
     larger,
     named,
-    plain,
     pointwise,
     rounded_down,
     rounded_up,
     smaller,
     square_root,
+    step,
     total,
-    traced_with,
 )
 from busplan.errors import BusplanError
 from busplan.sourced import cached
@@ -73,7 +72,7 @@ class Packing(NamedTuple):
     @property
     def wire_bytes(self) -> Number:
         """All frames on the wire [bytes]."""
-        return self.frames * overhead_bytes(self.frames) + self.datagrams_bytes + self.padding_bytes
+        return self.frames * overhead_bytes() + self.datagrams_bytes + self.padding_bytes
 
 
 def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> Packing:
@@ -100,7 +99,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     """
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
-    headers = total([traced_with(c.DATAGRAM_BYTES, devices[0].number)] * datagrams)
+    headers = total([c.DATAGRAM_BYTES] * datagrams)
     free: Number = 0.0  # bytes for data in the open frame, which is the last so far
     frames: Number = 0
     last: Number = 0.0
@@ -186,7 +185,7 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     room, headers = room_bytes(datagrams), datagrams * float(c.DATAGRAM_BYTES)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
-        size, left = plain(group.data_bytes), int(plain(group.number))
+        size, left = group.data_bytes, int(group.number)
         if group.starts and filled and size and left:
             if group.starts == "datagram" and opened + filled + headers + size <= room:
                 filled += headers
@@ -306,8 +305,8 @@ def unit_cycles(
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
         present = [unit.present(is_due=is_due) for unit, is_due in zip(units, due, strict=True)]
         packed = pack(present, datagrams=datagrams, first_bytes=first_bytes)
-        data_bytes = plain(sum(group.number * group.data_bytes for group in present))
-        cycles.append(UnitCycle(due, numbers, plain(packed.wire_bytes), plain(packed.last_bytes), data_bytes))
+        data_bytes = sum(group.number * group.data_bytes for group in present)
+        cycles.append(UnitCycle(due, numbers, packed.wire_bytes, packed.last_bytes, data_bytes))
     return tuple(sorted(cycles, key=lambda cycle: (-cycle.wire_bytes, -cycle.data_bytes)))
 
 
@@ -336,13 +335,13 @@ def has_rates(network: Network) -> bool:
 
 def rates(network: Network) -> tuple[Rate, ...]:
     """The rate of each group with its first cycle; of plain numbers."""
-    units, _ = _units(network, map(plain, _cycle_inputs(network, _all_devices(network))))
+    units, _ = _units(network, _cycle_inputs(network, _all_devices(network)))
     return unit_rates(units, is_spread=network.profile.bus.units == "spread")
 
 
 def cycles_of(network: Network) -> tuple[UnitCycle, ...]:
     """The distinct cycles of the hyperperiod, the fullest first; of plain numbers."""
-    return _cycles(network, map(plain, _cycle_inputs(network, _all_devices(network))))
+    return _cycles(network, _cycle_inputs(network, _all_devices(network)))
 
 
 def devices(network: Network) -> tuple[Devices, ...]:
@@ -377,7 +376,7 @@ def mean_wire_bytes(network: Network, *, with_reception: Number) -> Number:
         sum_bytes = cycles = 0.0
         for cycle in _cycles(network, numbers):
             # A cycle without process data may have no frame.
-            last_bytes = plain(frame_bytes(cycle.last_bytes)) if with_reception and cycle.last_bytes else 0.0
+            last_bytes = frame_bytes(cycle.last_bytes) if with_reception and cycle.last_bytes else 0.0
             sum_bytes += len(cycle.numbers) * (cycle.wire_bytes + last_bytes)
             cycles += len(cycle.numbers)
         return sum_bytes / cycles
@@ -416,7 +415,7 @@ def moves_us(network: Network, group: int) -> Number:
         for device in starts.union(devices[:1]):
             sent = [ends[min(bisect_left(ends, (device,)), len(ends) - 1)][1] for ends in cycles]
             moved_bytes = max(moved_bytes, max(sent) - min(sent))
-        return plain(sending_us(moved_bytes))
+        return sending_us(moved_bytes)
 
     words = "the latest end of the device's frame less the earliest, over the cycles with its data"
     return pointwise(at_point, *_cycle_inputs(network, _all_devices(network)), words=words)
@@ -430,7 +429,7 @@ def _frame_ends(
     ends, sent_bytes = [], 0.0
     for run in frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes):
         for carried in run.by_frame():
-            sent_bytes += plain(frame_bytes(run.datagrams_bytes))
+            sent_bytes += frame_bytes(run.datagrams_bytes)
             ends.append((carried.stop - 1, sent_bytes))
     return ends
 
@@ -471,19 +470,17 @@ def housekeeping_bytes(network: Network) -> Number:
     """Datagrams that the master adds to the first frame, that of distributed clocks included [bytes]."""
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
-        return total(datagram_bytes(traced_with(size, network.nodes)) for size in bus.housekeeping_bytes)
+        return total(datagram_bytes(size) for size in bus.housekeeping_bytes)
     tables = (
         (c.by_key("HOUSEKEEPING_BYTES"), c.by_key("CLOCK_BYTES"))
         if bus.distributed_clocks
         else (c.by_key("HOUSEKEEPING_BYTES"),)
     )
-    added = [
-        traced_with(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]
-    ]
+    added: list[Number] = [table[bus.master or UNNAMED] for table in tables if table[bus.master or UNNAMED]]
     if bus.master in c.by_key("STATE_CHECK_BYTES"):
         checks_bytes = network.nodes * c.by_key("STATE_CHECK_BYTES")[bus.master]
         # State checks of many devices fill frames of their own: their overhead counts here.
-        added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes(network.nodes)]
+        added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes()]
     return total(added)
 
 
@@ -499,13 +496,14 @@ def packing(network: Network, present: Sequence[Devices]) -> Packing:
 
 def frames(network: Network, present: Sequence[Devices]) -> tuple[FrameRun, ...]:
     """The same frames in their order; of plain numbers."""
-    first_bytes = plain(housekeeping_bytes(network))
+    first_bytes = housekeeping_bytes(network)
     return tuple(frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes))
 
 
+@step("sending", "sending_us")
 def process_us(network: Network, present: Sequence[Devices]) -> Number:
     """Time of the frames of process data of some devices on the wire [us]."""
-    return named(sending_us(packing(network, present).wire_bytes), "sending_us", "sending")
+    return sending_us(packing(network, present).wire_bytes)
 
 
 def mailbox_frame_us(network: Network) -> Number:
@@ -516,9 +514,7 @@ def mailbox_frame_us(network: Network) -> Number:
 def hop_us(group: Group) -> Number:
     """Delay of a device of a group, there and back: twice its `delay_us` [us]."""
     node = group.node
-    return device_us(
-        traced_with(c.by_key("DELAY_US")[node.port], group.nodes) if node.delay_us is None else node.delay_us
-    )
+    return device_us(c.by_key("DELAY_US")[node.port] if node.delay_us is None else node.delay_us)
 
 
 def devices_us(network: Network) -> Number:

@@ -26,19 +26,20 @@ from busplan.buses.limits import (
     NODE_LIMIT,
     NOT_SHOWN_KEPT,
     Cost,
+    ExactLimit,
     Key,
     Limit,
     PayloadRange,
     Perturbation,
     Setting,
+    ShareOfPeriod,
     Starter,
     TimingModel,
     nodes_limit,
-    share_of_period,
 )
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, choose, larger, plain
+from busplan.elementwise import Number, choose, larger
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -48,39 +49,72 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def _late_command_us(network: Network) -> Number:
-    """Latest time at which the last device has taken its command, bias included; 0 without clocks [us]."""
-    if not network.profile.bus.distributed_clocks:
-        return 0.0
-    cycle = EthercatCycle(network, LAST_BYTE)
-    return cycle.last_command_us + cycle.bias_us()
+class BeforeSync0(ShareOfPeriod):
+    """A command must be in every device before SYNC0."""
+
+    key = "sync0"
+    label = "SYNC0, before which commands must arrive"
+    way_out = "a larger bus.sync_shift moves SYNC0 later"
+
+    def share(self, network: Network) -> Number:
+        """When SYNC0 comes, as a share of the period [1]."""
+        return sync0_share(network)
+
+    def value(self, network: Network) -> Number:
+        """Latest time at which the last device has taken its command, bias included; 0 without clocks [us]."""
+        if not network.profile.bus.distributed_clocks:
+            return 0.0
+        cycle = EthercatCycle(network, LAST_BYTE)
+        return cycle.last_command_us + cycle.bias_us()
+
+    def doubt(self, network: Network) -> Number:
+        """Standard uncertainty of that time [us]."""
+        return EthercatCycle(network, LAST_BYTE).command_doubt_us if network.profile.bus.distributed_clocks else 0.0
+
+    def perhaps(self, network: Network) -> Number:
+        """The master may spend all of its time before the frame, or none [us]."""
+        return network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0
+
+    def words(self, network: Network) -> str:
+        """When the last command comes, and if it is late only where all of bus.master_us is spent before the frame."""
+        value_us, doubt_us, most_us = self.value(network), self.uncertainty(network), self.most(network)
+        depends = self.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
+        where = ", all of bus.master_us before the wire" if depends else ""
+        return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
 
 
-def _late_command_doubt_us(network: Network) -> Number:
-    """Standard uncertainty of that time [us]."""
-    return EthercatCycle(network, LAST_BYTE).command_doubt_us if network.profile.bus.distributed_clocks else 0.0
+class SyncWindow(Limit):
+    """A frame must not move farther against SYNC0 than each drive allows."""
 
+    key = "sync_window"
+    way_out = "measure bus.master_jitter_us, or make it smaller"
+    place = "bus.master_jitter_us"
 
-def _late_command_words(network: Network) -> str:
-    """Say when the last command comes, and if it is late only where all of bus.master_us is spent before the frame."""
-    value_us, doubt_us, most_us = (
-        plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
-    )
-    depends = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
-    where = ", all of bus.master_us before the wire" if depends else ""
-    return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
+    def value(self, network: Network) -> Number:
+        """How far frames may move beyond a drive's window, the most of any group; below 0 inside of it [us]."""
+        beyond_us: Number = -inf
+        for group, us in _moves_us(network):
+            beyond_us = larger(beyond_us, us - group.node.sync_window_us)
+        return beyond_us + self.perhaps(network)
 
+    def most(self, _network: Network) -> Number:
+        """0 [us]."""
+        return 0
 
-SYNC0: Final = share_of_period(
-    "sync0",
-    _late_command_words,
-    us=_late_command_us,
-    share=sync0_share,
-    doubt=_late_command_doubt_us,
-    perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
-    way_out="a larger bus.sync_shift moves SYNC0 later",
-)._replace(label="SYNC0, before which commands must arrive")
-"""A command must be in every device before SYNC0."""
+    def perhaps(self, network: Network) -> Number:
+        """The jitter that a master may have whose jitter is not given: any [us]."""
+        return choose(network.profile.bus.master_jitter_us > 0, 0.0, MAX_TIME_US)
+
+    def words(self, network: Network) -> str:
+        """How far frames move at the group that is farthest beyond its window, and the jitter that it allows."""
+        jitter_us = network.profile.bus.master_jitter_us
+        moves = ((group, us, group.node.sync_window_us) for group, us in _moves_us(network))
+        group, us, most_us = max(moves, key=lambda move: move[1] - move[2])
+        of_group = f"{group.name}: " if group.name else ""
+        without = "" if jitter_us else " without the jitter, which is not given"
+        left_us = most_us - us + jitter_us
+        allowed = f"a jitter of {left_us:.4g} us is allowed" if left_us > 0 else "no jitter is small enough"
+        return f"{of_group}frames move {us:.1f} us against SYNC0{without}, and a drive allows {most_us:g} us: {allowed}"
 
 
 def _moves_us(network: Network) -> Iterator[tuple[Group, Number]]:
@@ -90,52 +124,17 @@ def _moves_us(network: Network) -> Iterator[tuple[Group, Number]]:
             yield group, network.profile.bus.master_jitter_us + moves_us(network, index)
 
 
-def _beyond_window_us(network: Network) -> Number:
-    """How far frames may move beyond a drive's window, the most of any group; below 0 inside of it [us]."""
-    beyond_us: Number = -inf
-    for group, us in _moves_us(network):
-        beyond_us = larger(beyond_us, us - group.node.sync_window_us)
-    return beyond_us + _unknown_jitter_us(network)
-
-
-def _unknown_jitter_us(network: Network) -> Number:
-    """The jitter that a master may have whose jitter is not given: any [us]."""
-    return choose(network.profile.bus.master_jitter_us > 0, 0.0, MAX_TIME_US)
-
-
-def _window_words(network: Network) -> str:
-    """Say how far frames move at the group that is farthest beyond its window, and the jitter that it allows."""
-    jitter_us = plain(network.profile.bus.master_jitter_us)
-    moves = ((group, plain(us), plain(group.node.sync_window_us)) for group, us in _moves_us(network))
-    group, us, most_us = max(moves, key=lambda move: move[1] - move[2])
-    of_group = f"{group.name}: " if group.name else ""
-    without = "" if jitter_us else " without the jitter, which is not given"
-    left_us = most_us - us + jitter_us
-    allowed = f"a jitter of {left_us:.4g} us is allowed" if left_us > 0 else "no jitter is small enough"
-    return f"{of_group}frames move {us:.1f} us against SYNC0{without}, and a drive allows {most_us:g} us: {allowed}"
-
-
-SYNC_WINDOW: Final = Limit(
-    "sync_window",
-    _window_words,
-    _beyond_window_us,
-    lambda _network: 0,
-    perhaps=_unknown_jitter_us,
-    way_out="measure bus.master_jitter_us, or make it smaller",
-    place="bus.master_jitter_us",
-)
-"""A frame must not move farther against SYNC0 than each drive allows."""
 LIMITS: Final = (
     NODE_LIMIT,
     nodes_limit("devices", lambda: c.MOST_DEVICES, "segment", of="addresses of a"),
-    Limit(
+    ExactLimit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
         lambda network: reduce(larger, (data_bytes(group, network) for group in network.groups)),
         lambda network: room_bytes(datagrams(network)),
         way_out="a smaller payload would do",
     ),
-    Limit(
+    ExactLimit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
         lambda network: reduce(larger, (group.node.cable_length_m for group in network.groups)),
@@ -143,8 +142,8 @@ LIMITS: Final = (
         way_out="a device in between would do",
         place="node.cable_length_m",
     ),
-    SYNC0,
-    SYNC_WINDOW,
+    BeforeSync0(),
+    SyncWindow(),
 )
 
 
@@ -163,14 +162,14 @@ def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
 def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The last command is not shown to be taken before SYNC0, and may take effect cycles later."""
     figures = subject.deciding
-    if SYNC0.key not in (*figures.exceeded, *(figures.not_shown or ())):
+    if BeforeSync0.key not in (*figures.exceeded, *(figures.not_shown or ())):
         return
     late = max(ceil((figures.own["command_us"] - figures.own["sync0_us"]) / figures.period_us), 1)
-    maybe = "" if SYNC0.key in figures.exceeded else "maybe "
+    maybe = "" if BeforeSync0.key in figures.exceeded else "maybe "
     yield RuleProblem(
         "bus.sync_shift",
-        f"{subject.limit_words(SYNC0.key)}: {maybe}{plural(late, 'cycle')} late",
-        SYNC0.way_out,
+        f"{subject.limit_words(BeforeSync0.key)}: {maybe}{plural(late, 'cycle')} late",
+        BeforeSync0.way_out,
         subject.cure().cure,
     )
 
@@ -301,7 +300,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The layout of process data, the frames, and the clocks."""
-        count = int(plain(self.cycle(network, model=LAST_BYTE).packing.frames))
+        count = int(self.cycle(network, model=LAST_BYTE).packing.frames)
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
         return (layout(network), f"{plural(count, 'frame')}", *clocks)
 

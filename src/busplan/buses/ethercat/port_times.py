@@ -7,7 +7,6 @@ from typing import Final, NamedTuple
 from busplan.buses.ethercat.equations import c, cable_us
 from busplan.buses.network import Network
 from busplan.buses.rule import RecordedFigure
-from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.recordings.ethercat import Latch
 from busplan.recordings.statistics import expanded
@@ -59,18 +58,19 @@ class LineDelays(NamedTuple):
     def more_us(self, network: Network) -> float:
         """Delay of the devices there and back with the values of `edits`, less that of the plan [us]."""
         edits = self.edits(network)
-        return sum(
-            2 * plain(nodes.nodes) * (edits[key] - _planned_us(nodes))
+        more_us: float = sum(
+            2 * nodes.nodes * (edits[key] - _planned_us(nodes))
             for nodes in network.profile.node_groups
             if (key := nodes.node_key("delay_us")) in edits
         )
+        return more_us
 
     def _groups(self, network: Network) -> list[tuple[ProfileGroup, range]]:
         """Each group of the plan with the numbers of its devices, from 2: port receive times show no delay of device 1.
 
         Empty where the plan has another number of devices.
         """
-        ends = list(accumulate(int(plain(nodes.nodes)) for nodes in network.profile.node_groups))
+        ends = list(accumulate(int(nodes.nodes) for nodes in network.profile.node_groups))
         if ends[-1] != len(self.hops_us) + 1:
             return []
         numbers = (range(max(end, 1) + 1, next_end + 1) for end, next_end in pairwise((0, *ends)))
@@ -186,9 +186,9 @@ def _span_ns(times_ns: Mapping[int, int]) -> int:
 def _planned_us(nodes: ProfileGroup) -> float:
     """Delay of a device one way as planned [us]."""
     delay_us = nodes.node.delay_us
-    return float(c.by_key("DELAY_US")[nodes.node.port]) if delay_us is None else plain(delay_us)
+    return float(c.by_key("DELAY_US")[nodes.node.port]) if delay_us is None else delay_us
 
 
 def _cable_us(nodes: ProfileGroup) -> float:
     """Cable to a device one way [us]."""
-    return plain(cable_us(nodes.node.cable_length_m)) / 2
+    return cable_us(nodes.node.cable_length_m) / 2

@@ -27,7 +27,6 @@ from busplan.buses.ethercat.port_times import line_delays
 from busplan.buses.ethercat.recorded_cycles import Ints, SeenCycles, seen_cycles
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
-from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -127,7 +126,7 @@ class _Seen:
         """Datagrams of the master itself that have a logical address."""
         process = [tuple(filter(self._is_process_data, layout)) for layout in frames.layouts]
         datagrams = np.array([_datagrams_bytes(layout) for layout in frames.layouts])
-        wire_us = np.array([plain(sending_us(frame_bytes(size))) for size in datagrams.tolist()])
+        wire_us = np.array([sending_us(frame_bytes(size)) for size in datagrams.tolist()])
         self.datagrams_bytes, self.wire_us = datagrams[frames.layout], wire_us[frames.layout]
         self.data_bytes = np.array([float(sum(part.data_bytes for part in parts)) for parts in process])[frames.layout]
         self.is_data = np.array([bool(parts) for parts in process])[frames.layout]
@@ -171,7 +170,7 @@ class _Seen:
     @property
     def early(self) -> int:
         """Number of frames that returned sooner than it takes to send them."""
-        least_us = self.wire_us[self.trips.sent] - plain(sending_us(c.GAP_BYTES)) - 2 * self.stamp_us
+        least_us = self.wire_us[self.trips.sent] - sending_us(c.GAP_BYTES) - 2 * self.stamp_us
         return int(np.count_nonzero(self.trips_us < least_us))
 
     @property
@@ -207,7 +206,7 @@ class _Seen:
     def _period(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
         """Period, and latest start of a cycle."""
         periods, count = cycles.periods, len(cycles.first)
-        period_us, jitter_us = plain(self.network.period_us), plain(self.network.profile.bus.master_jitter_us)
+        period_us, jitter_us = self.network.period_us, self.network.profile.bus.master_jitter_us
         period = RecordedFigure("period", "us", period_us, None, None, "equal", count, _PERIOD)
         start = RecordedFigure("latest start", "us", jitter_us, None, None, "at most", count, _JITTER)
         if periods is None:
@@ -262,7 +261,7 @@ class _Seen:
             np.bincount(number, weights=values[cycles.frames])
             for values in (self.wire_us, self.data_bytes, self.datagrams_bytes)
         )
-        way_us = plain(devices_us(self.network)) + plain(cables_us(self.network)) + self.delays.more_us(self.network)
+        way_us = devices_us(self.network) + cables_us(self.network) + self.delays.more_us(self.network)
         host_us = trips_us - wire_us - data_bytes * c.BYTE_BIAS_US - way_us
         return _CycleValues(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
 
@@ -293,20 +292,20 @@ class _Seen:
         bus, count = self.network.profile.bus, len(trips_us)
         planned = EthercatCycle(self.network, LAST_BYTE, sort.numbers[0])
         in_trip = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
-        planned_us = sum(plain(planned.by_term[key]) for key in in_trip) + plain(planned.bias_us())
+        planned_us = sum(planned.by_term[key] for key in in_trip) + planned.bias_us()
         few = f"{plural(count, 'whole cycle')}, and a figure takes {LEAST_EVENTS}" if count < LEAST_EVENTS else ""
         hidden = self.bad_stamps or few
         trip = RecordedFigure(f"round trip{with_names}", "us", planned_us, None, None, "at most", count, hidden=hidden)
         master = RecordedFigure(
-            "master's time", "us", plain(bus.master_us), None, None, "at most", count, _MASTER, hidden=hidden
+            "master's time", "us", bus.master_us, None, None, "at most", count, _MASTER, hidden=hidden
         )
         if hidden:
             yield from (trip, master) if host_us else (trip,)
             return
         doubts = [
-            *(plain(doubt.us) for doubt in devices_doubts(self.network)),
-            plain(planned.process_bytes) * c.BYTE_BIAS_UNCERTAINTY_US,
-            plain(bus.master_doubt_us),
+            *(doubt.us for doubt in devices_doubts(self.network)),
+            planned.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US,
+            bus.master_doubt_us,
             self.stamp_us * _TWO_STAMPS,
         ]
         if host_us:
@@ -332,7 +331,7 @@ class _Seen:
         if sort.data_bytes:
             name, frames = f"frames in a cycle{with_names}", int(per_cycle.frames[of_sort[0]]) if count else None
             hidden = "" if count else "no such cycle is in the recording"
-            yield RecordedFigure(name, "1", plain(planned.frames), frames, None, "equal", count, hidden=hidden)
+            yield RecordedFigure(name, "1", planned.frames, frames, None, "equal", count, hidden=hidden)
         if not count:
             return
         # Show the middle one of the most frequent cycles: now and then a master adds a datagram.
@@ -344,7 +343,7 @@ class _Seen:
         yield RecordedFigure(
             f"datagrams of a cycle{with_names}",
             "bytes",
-            plain(planned.datagrams_bytes),
+            planned.datagrams_bytes,
             float(usual_bytes),
             None,
             "at most",
@@ -355,7 +354,7 @@ class _Seen:
             ),
         )
         added = [part for layout in layouts for part in layout if not self._is_process_data(part)]
-        if sort is cycles.sorts[0] and _datagrams_bytes(added) != plain(housekeeping_bytes(self.network)):
+        if sort is cycles.sorts[0] and _datagrams_bytes(added) != housekeeping_bytes(self.network):
             self.master_bytes = [part.data_bytes for part in added]
 
     def _lost(self) -> Iterator[RecordedFigure]:
@@ -469,7 +468,7 @@ def _own_reads(network: Network, layouts: Sequence[tuple[Datagram, ...]]) -> fro
     """
     found: set[Datagram] = set()
     planned: Sequence[int] | None = network.profile.bus.housekeeping_bytes
-    sizes = range(1, ceil(plain(network.nodes) / _BITS) + 1) if planned is None else planned
+    sizes = range(1, ceil(network.nodes / _BITS) + 1) if planned is None else planned
     for layout in layouts:
         logical = sorted((part for part in layout if part.is_logical), key=attrgetter("address"))
         names = [COMMANDS[part.command] for part in logical]
@@ -479,7 +478,7 @@ def _own_reads(network: Network, layouts: Sequence[tuple[Datagram, ...]]) -> fro
 
 
 def _datagrams_bytes(parts: Sequence[Datagram]) -> float:
-    return sum(part.data_bytes + plain(c.DATAGRAM_BYTES) for part in parts)
+    return sum(part.data_bytes + c.DATAGRAM_BYTES for part in parts)
 
 
 def _trips(frames: EthercatFrames) -> _Trips:

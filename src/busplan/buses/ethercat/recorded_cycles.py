@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from busplan.buses.ethercat.frames import UnitCycle, cycles_of
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, periodic_events
 
 Ints = npt.NDArray[np.int64]
@@ -103,7 +102,7 @@ def seen_cycles(frames: Ints, times_us: Floats, kinds: Ints, data_bytes: Floats,
         The plan, of plain numbers.
     """
     plan = PlannedCycles(network)
-    period_us = plain(network.period_us)
+    period_us = network.period_us
     starts, near_us = _starts(times_us, kinds, plan, period_us)
     in_bursts = len(starts) > 1 and float(np.median(np.diff(times_us[starts]))) < _BURST * period_us
     begin, end = 0, len(starts)

@@ -23,7 +23,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import CycleWithStarts
 from busplan.buses.ieee1394.timing import IdleTime, Phases, Responder, idle_time, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, is_off, larger, named, total, traced_with
+from busplan.elementwise import Number, is_off, larger, step, total
 from busplan.sections.base import TransactionKind
 
 
@@ -62,11 +62,11 @@ class BroadcastCycle(CycleWithStarts):
     """
 
     @cached_property
+    @step("T_query")
     def query_us(self) -> Number:
         """The query with its acknowledge [us]."""
         data_us = self.delays.data_us(c.QUADLET_WRITE_REQUEST_BYTES)
-        query_us = self.delays.arbitration_us + data_us + self.delays.acknowledge_us
-        return named(query_us, "query_us", "T_query")
+        return self.delays.arbitration_us + data_us + self.delays.acknowledge_us
 
     @property
     def _is_isochronous(self) -> bool:
@@ -87,7 +87,7 @@ class BroadcastCycle(CycleWithStarts):
         return larger(self._clocks_us(c.FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
 
     def _clocks_us(self, clocks: Number) -> Number:
-        return traced_with(clocks, self.link.hops) / c.BROADCAST_CLOCK_MHZ
+        return clocks / c.BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
         """Wait of the next node after the broadcast of a node, where each has its own time [us].
@@ -135,11 +135,12 @@ class BroadcastCycle(CycleWithStarts):
         return self.first_wait_us + self.network.nodes * self.gap_us + self.slot_waits_us
 
     @cached_property
+    @step("T_boards")
     def boards_us(self) -> Number:
         """All broadcasts with their gaps [us]."""
         each_us = self.gap_us + self.arbitration_us
         sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
-        return named(self.first_wait_us + sent_us + self.slot_waits_us, "boards_us", "T_boards")
+        return self.first_wait_us + sent_us + self.slot_waits_us
 
     @cached_property
     def hub(self) -> Phases:
@@ -157,10 +158,11 @@ class BroadcastCycle(CycleWithStarts):
         return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
 
     @cached_property
+    @step("late")
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
-        wait_us = traced_with(c.HUB_WAIT_US, self.network.nodes) + c.HUB_WAIT_PER_NODE_US * self.network.nodes
-        return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
+        wait_us = c.HUB_WAIT_US + c.HUB_WAIT_PER_NODE_US * self.network.nodes
+        return larger(wait_us - self.boards_us, 0.0)
 
     @cached_property
     def hub_wait(self) -> IdleTime:
@@ -228,6 +230,12 @@ class BroadcastCycle(CycleWithStarts):
             transaction_us=latency_us + (self.hub.idle_us + self.hub.host_us),
         )
 
+    def all_us(self, kind: TransactionKind) -> Number:
+        """The broadcasts of all nodes and the read of the hub; or the write of all commands [us]."""
+        if kind == "write":
+            return self.write.transaction_us
+        return self.boards_us + self.hub_wait.us + self.hub.transaction_us
+
     def longest(self, kind: TransactionKind) -> Phases:
         """The read of all data, or the write of all commands [us]."""
         return self.read if kind == "read" else self.write
@@ -236,8 +244,8 @@ class BroadcastCycle(CycleWithStarts):
         """The data of a node to the host, and a command to it; they are those of all nodes."""
         link = {"hops": self.link.hops, "gap_count": self.link.gap_count}
         before_hub = {"query_us": self.query_us, "boards_us": self.boards_us, "hub_wait_us": self.hub_wait.us}
-        read = {**link, **before_hub, **self.read._asdict()}
-        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict()}
+        read = {**link, **before_hub, **self.read._asdict(), "all_us": self.reads_us}
+        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict(), "all_us": self.writes_us}
         return tuple(
             latency
             for group in self.network.groups
@@ -268,9 +276,10 @@ class BroadcastCycle(CycleWithStarts):
         )
 
     @property
+    @step("halves")
     def halves(self) -> Number:
         """Packets: the query, each broadcast, two of the hub, the write, and retries [1]."""
-        return named(self.network.nodes + 4 + self.network.profile.cycle.retries, "halves", "halves")
+        return self.network.nodes + 4 + self.network.profile.cycle.retries
 
     @property
     def with_gap(self) -> Number:

@@ -13,7 +13,7 @@ from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
     c,
 )
-from busplan.buses.ieee1394.figures import LATENCY, SYNC, TERMS
+from busplan.buses.ieee1394.figures import LATENCY, READS, SYNC, TERMS, WRITES
 from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import (
     Exchange,
@@ -28,8 +28,8 @@ from busplan.buses.ieee1394.transactions import (
 )
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
-from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, smaller, total
+from busplan.buses.time_slice import required_time_slice_us, time_slice_us
+from busplan.elementwise import Number, is_off, larger, named, rounded_down, smaller, step, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 _PHASES: Final = by_key(LATENCY)
@@ -171,6 +171,36 @@ class CycleWithStarts(BusCycle):
         starts = (Run((self._start,), self.number_of_starts),) if self._has_starts else ()
         return self._terms_without_starts | summed(starts, (self._start.term,))
 
+    @abstractmethod
+    def all_us(self, kind: TransactionKind) -> Number:
+        """All reads T_r or all writes T_w of a cycle, with their gaps [us]."""
+
+    @cached_property
+    @step(READS.symbol)
+    def reads_us(self) -> Number:
+        """T_r [us]."""
+        return self.all_us("read")
+
+    @cached_property
+    @step(WRITES.symbol)
+    def writes_us(self) -> Number:
+        """T_w [us]."""
+        return self.all_us("write")
+
+    @property
+    def required_time_slice_us(self) -> Number:
+        """Equation (2); cycle starts and retries, which the paper does not have, are added [us]."""
+        terms, nodes = self.by_term, self.network.nodes
+        slice_us = required_time_slice_us(
+            self.reads_us,
+            writes_us=self.writes_us,
+            nonperiodic_us=terms[NONPERIODIC.key],
+            sync_us=terms[SYNC.key],
+            nodes=nodes,
+        )
+        added = [us for us in (terms["cycle_starts_us"], terms["retries_us"]) if not is_off(us)]
+        return slice_us + total(added) / nodes if added else slice_us
+
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
@@ -189,8 +219,8 @@ class CycleWithStarts(BusCycle):
         if not at_sync:
             return 0
         behind_us = max(self.taking_us(group) for group in self.network.groups)
-        period_us = plain(self.network.period_us)
-        needed_us = min(plain(self.required_us), period_us)
+        period_us = self.network.period_us
+        needed_us = min(self.required_us, period_us)
         return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
     def figures(self) -> Mapping[str, Number | None]:
@@ -200,7 +230,7 @@ class CycleWithStarts(BusCycle):
             "hops": self.link.hops,
             "gap_count": self.link.gap_count,
             "safe_gap_count": safe,
-            "gap_count_safe": self.link.gap_count >= named(safe, "safe_gap_count", "g_safe"),
+            "gap_count_safe": self.link.gap_count >= safe,
             "read_latency_us": read.latency_us,
             "write_latency_us": write.latency_us,
             "read_latency_with_gaps_us": read.latency_with_gaps_us,
@@ -210,6 +240,8 @@ class CycleWithStarts(BusCycle):
             "gaps_us": self.delays.gaps.both_us,
             "subaction_gap_us": self.delays.gaps.subaction_us,
             "arbitration_reset_gap_us": self.delays.gaps.arbitration_reset_us,
+            READS.key: self.reads_us,
+            WRITES.key: self.writes_us,
             "nodes_eq11": self.published_nodes(),
         }
 
@@ -224,7 +256,7 @@ class CycleWithStarts(BusCycle):
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
-        starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
+        starts, start_us = int(self.number_of_starts), self.cycle_start_us
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
         for round_ in map(tuple, super().each_round()):
@@ -233,13 +265,13 @@ class CycleWithStarts(BusCycle):
                 sent, now_us = sent + 1, now_us + start_us
             yield round_
             for event in round_:
-                now_us += plain(event.us)
+                now_us += event.us
         yield from repeat(start, starts - sent)
 
     def added_before_us(self, sent_us: float) -> float:
         """The cycle starts that are due before a round [us]."""
         due = smaller(self.starts(sent_us), self.number_of_starts)
-        return plain(due) * plain(self.cycle_start_us)
+        return due * self.cycle_start_us
 
 
 class Ieee1394Cycle(CycleWithStarts):
@@ -331,6 +363,11 @@ class Ieee1394Cycle(CycleWithStarts):
             transaction = self._exchange(place, transaction.kind, self._hops[place].of_node(number))
         return events(transaction, model=self.model)
 
+    def all_us(self, kind: TransactionKind) -> Number:
+        """Each read or write of all nodes, with its gaps [us]."""
+        sent = (exchange for exchange in self.exchanges if exchange.kind == kind)
+        return total(exchange.group.nodes * exchange.phases.transaction_us for exchange in sent)
+
     def bias_us(self) -> Number | None:
         """Mean time that the transactions take beyond the model [us]; None under the paper model."""
         if self.model == "paper":
@@ -366,10 +403,10 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """A read and a write of the farthest node of each group."""
-        latencies = []
+        latencies, all_us = [], {"read": self.reads_us, "write": self.writes_us}
         for place, kind in product(range(len(self.network.groups)), TRANSACTION_KINDS):
             sent = self._exchange(place, kind, self._hops[place].last)
             link = sent.delays.link
-            phases = {"hops": link.hops, "gap_count": link.gap_count, **sent.phases._asdict()}
+            phases = {"hops": link.hops, "gap_count": link.gap_count, **sent.phases._asdict(), "all_us": all_us[kind]}
             latencies.append(BusLatency(kind, sent.payload_bytes, phases, sent.group.name))
         return tuple(latencies)

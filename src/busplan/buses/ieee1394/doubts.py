@@ -21,7 +21,7 @@ from busplan.buses.ieee1394.timing import (
 from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Exchange
 from busplan.buses.network import Network
 from busplan.buses.published import Spread, rows_of
-from busplan.elementwise import Number, choose, is_off, larger, named, total, traced_with
+from busplan.elementwise import Number, choose, is_off, larger, named, step, total
 from busplan.sourced import Sourced, cached
 
 _RECTANGULAR: Final = sqrt(3)
@@ -87,7 +87,7 @@ def gap_term_us(gap_count: Number, *, measured: Number = MAX_GAP_COUNT, symbol: 
     symbol
         Symbol in a derivation.
     """
-    ticks = traced_with(c.ARBITRATION_GAP_TICKS, gap_count) / 2
+    ticks = c.ARBITRATION_GAP_TICKS / 2
     return named(ticks * (measured - gap_count) / c.BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
 
 
@@ -207,7 +207,7 @@ def of_inputs(
     if not link.has_gaps:
         # What is left out of a lower bound has no doubt of its own: no verdict rests on the bound but "does not fit".
         residual_us = gap_term_us = phy_delays = 0.0
-    half_width_us = traced_with(c.PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
+    half_width_us = c.PHY_DELAY_HALF_WIDTH_US if link.phy_delay_us is None else 0.0
     return (
         Doubt("residual", "residual of Table I", residual_us),
         Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
@@ -248,11 +248,12 @@ def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ..
     return tuple((node, named(total(halves), "split_halves", "halves")) for node, halves in counts.values())
 
 
+@step("halves_other")
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
     """Halves of all other transactions in the cycle, and retries [1]."""
     unsplit = [exchange for exchange in exchanges if exchange.responder.answer != "split"]
     halves = total(exchange.group.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
-    return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
+    return halves + network.profile.cycle.retries
 
 
 def _is_fitted(node: Any) -> Number:

@@ -1,11 +1,12 @@
 """Equations (3)-(15) of the paper, a function each; (1) and (2) stand in `busplan.buses.time_slice`.
 
-The functions are operators only: a float in gives a float, NumPy arrays broadcast. Times are in us, rates in
-Mbit/s (which is bit/us, so that bits / rate is in us), lengths in m, sizes in bytes. Nothing is checked here:
-the profile has refused what makes no sense, and a rate of zero raises ZeroDivisionError.
+Each parameter is a float or an array, and so is the result, in their broadcast shape; a derivation gives traced
+numbers. Times are in us, rates in Mbit/s (bit/us, so that bits / rate is in us), lengths in m, sizes in bytes.
+Nothing is checked here: the profile has refused what makes no sense, and a divisor of zero raises ZeroDivisionError.
 
-The paper writes the same `Bandwidth` for the data rate and for the clock that gaps and PHY delays are counted in.
-Here they are two parameters, `data_rate_mbit_s` and `gap_clock_mbit_s`: the timing models differ in the second.
+The symbols are the paper's, but for what it writes out or calls N and Bandwidth alike: H cable hops between the two
+nodes (N in its chain), g the gap count (0..63), B a packet with its overhead, P its payload, L the length of a cable,
+R the data rate, and C the clock that gaps and PHY delays are counted in: the timing models differ in it.
 
 References
 ----------
@@ -13,16 +14,12 @@ G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Cont
 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
 
-from busplan.buses.ieee1394.constants import (
-    BITS_PER_BYTE,
-    c,
-)
-from busplan.elementwise import Number
+from busplan.buses.ieee1394.constants import BITS_PER_BYTE, c
+from busplan.elementwise import Number, step
 from busplan.sourced import SYMBOLS, published
 
 SYMBOLS.update(
     {
-        "sync_us": "CTS",
         "request_us": "T_req",
         "response_us": "T_resp",
         "request_acknowledge_us": "T_ack1",
@@ -46,8 +43,6 @@ SYMBOLS.update(
         **{f"t{number}_us": f"T{number}" for number in range(1, 6)},
     }
 )
-# The paper's own symbols, but for what it writes out or calls N and Bandwidth alike: hops H, gap count g, rate R,
-# clock C, packet B, payload P, cable L.
 
 
 @published(3, symbol="T_lant", section="III-E")
@@ -61,23 +56,7 @@ def transaction_latency_us(
 ) -> Number:
     """Latency of an asynchronous transaction from its five parts.
 
-    Parameters
-    ----------
-    request_us
-        Request time T_req of equation (7) [us]; float or array.
-    request_acknowledge_us
-        Acknowledge of the request T_ack1 of equation (9) [us]; float or array.
-    execution_us
-        Execution time T_exec in the responder, measured [us]; float or array.
-    response_us
-        Response time T_resp of equation (8) [us]; float or array.
-    response_acknowledge_us
-        Acknowledge of the response T_ack2 of equation (9) [us]; float or array.
-
-    Returns
-    -------
-    float
-        T_lant = T_req + T_ack1 + T_exec + T_resp + T_ack2 [us]; the broadcast shape of the arguments.
+    T_lant = T_req + T_ack1 + T_exec + T_resp + T_ack2 [us].
 
     Examples
     --------
@@ -93,20 +72,7 @@ def transaction_latency_us(
 def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
     """Repeat delay of a PHY.
 
-    Parameters
-    ----------
-    gap_clock_mbit_s
-        Clock that PHY delays are counted in [Mbit/s]; float or array.
-
-    Returns
-    -------
-    float
-        T_phy = 14 / C [us]; the shape of the argument.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+    T_phy = 14 / C [us].
 
     Examples
     --------
@@ -124,20 +90,11 @@ def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
     section="III-E",
     part="their bracket, for a cable of 4.5 m; in proportion to the length for others",
 )
+@step("hop", "hop_us")
 def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
     """Delay of a hop, cable and PHY.
 
-    Parameters
-    ----------
-    cable_length_m
-        Length of a cable [m]; float or array.
-    phy_delay_us
-        Repeat delay of a PHY [us]; float or array.
-
-    Returns
-    -------
-    float
-        hop = 0.023 L / 4.5 + T_phy [us]; the broadcast shape of the arguments.
+    hop = 0.023 L / 4.5 + T_phy [us].
 
     Examples
     --------
@@ -151,26 +108,7 @@ def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
 def arbitration_phase_us(hops: Number, *, hop_us: Number, gap_count: Number, gap_clock_mbit_s: Number) -> Number:
     """Arbitration phase of a packet.
 
-    Parameters
-    ----------
-    hops
-        Cable hops between the two nodes, N in the paper's chain [1]; float or array.
-    hop_us
-        Delay of a hop [us]; float or array.
-    gap_count
-        Gap count of the bus, 0..63 [1]; float or array.
-    gap_clock_mbit_s
-        Clock that gaps are counted in [Mbit/s]; float or array.
-
-    Returns
-    -------
-    float
-        ArbP = hop H + 4 g / C + 1.63 [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+    ArbP = hop H + 4 g / C + 1.63 [us].
 
     Examples
     --------
@@ -184,26 +122,7 @@ def arbitration_phase_us(hops: Number, *, hop_us: Number, gap_count: Number, gap
 def data_phase_us(hops: Number, *, hop_us: Number, packet_bytes: Number, data_rate_mbit_s: Number) -> Number:
     """Data-transfer phase of a packet.
 
-    Parameters
-    ----------
-    hops
-        Cable hops between the two nodes [1]; float or array.
-    hop_us
-        Delay of a hop [us]; float or array.
-    packet_bytes
-        Packet size DataSize, payload and overhead [bytes]; float or array.
-    data_rate_mbit_s
-        Data rate of the packet [Mbit/s]; float or array.
-
-    Returns
-    -------
-    float
-        DTP = hop H + 8 B / R [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        The rate is zero.
+    DTP = hop H + 8 B / R [us].
 
     Examples
     --------
@@ -217,17 +136,7 @@ def data_phase_us(hops: Number, *, hop_us: Number, packet_bytes: Number, data_ra
 def acknowledge_phase_us(hops: Number, *, hop_us: Number) -> Number:
     """Acknowledge phase of a packet.
 
-    Parameters
-    ----------
-    hops
-        Cable hops between the two nodes [1]; float or array.
-    hop_us
-        Delay of a hop [us]; float or array.
-
-    Returns
-    -------
-    float
-        AckP = hop H + 0.25 [us]; the broadcast shape of the arguments.
+    AckP = hop H + 0.25 [us].
 
     Examples
     --------
@@ -241,17 +150,7 @@ def acknowledge_phase_us(hops: Number, *, hop_us: Number) -> Number:
 def request_us(arbitration_us: Number, *, data_us: Number) -> Number:
     """Request time of a transaction.
 
-    Parameters
-    ----------
-    arbitration_us
-        Arbitration phase ArbP_time of equation (4) [us]; float or array.
-    data_us
-        Data-transfer phase DTP_time of the request packet, equation (5) [us]; float or array.
-
-    Returns
-    -------
-    float
-        T_req = ArbP + DTP [us]; the broadcast shape of the arguments.
+    T_req = ArbP + DTP [us].
 
     Examples
     --------
@@ -265,17 +164,7 @@ def request_us(arbitration_us: Number, *, data_us: Number) -> Number:
 def response_us(arbitration_us: Number, *, data_us: Number) -> Number:
     """Response time of a transaction.
 
-    Parameters
-    ----------
-    arbitration_us
-        Arbitration phase ArbP_time of equation (4) [us]; float or array.
-    data_us
-        Data-transfer phase DTP_time of the response packet, equation (5) [us]; float or array.
-
-    Returns
-    -------
-    float
-        T_resp = ArbP + DTP [us]; the broadcast shape of the arguments.
+    T_resp = ArbP + DTP [us].
 
     Examples
     --------
@@ -289,15 +178,7 @@ def response_us(arbitration_us: Number, *, data_us: Number) -> Number:
 def acknowledge_us(acknowledge_phase_us: Number) -> Number:
     """Acknowledge time of either half of a transaction.
 
-    Parameters
-    ----------
-    acknowledge_phase_us
-        Acknowledge phase AckP_time of equation (6) [us]; float or array.
-
-    Returns
-    -------
-    float
-        T_ack1 = T_ack2 = AckP [us]; the shape of the argument.
+    T_ack1 = T_ack2 = AckP [us].
 
     Examples
     --------
@@ -308,25 +189,11 @@ def acknowledge_us(acknowledge_phase_us: Number) -> Number:
 
 
 @published(10, symbol="T_sub", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
+@step("T_sub")
 def subaction_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Subaction gap.
 
-    Parameters
-    ----------
-    gap_count
-        Gap count of the bus, 0..63 [1]; float or array.
-    gap_clock_mbit_s
-        Clock that gaps are counted in [Mbit/s]; float or array.
-
-    Returns
-    -------
-    float
-        T_sub = (29 + 16 g) / C [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+    T_sub = (29 + 16 g) / C [us].
 
     Examples
     --------
@@ -337,25 +204,11 @@ def subaction_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
 
 
 @published(10, symbol="T_reset", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
+@step("T_reset")
 def arbitration_reset_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Arbitration reset gap.
 
-    Parameters
-    ----------
-    gap_count
-        Gap count of the bus, 0..63 [1]; float or array.
-    gap_clock_mbit_s
-        Clock that gaps are counted in [Mbit/s]; float or array.
-
-    Returns
-    -------
-    float
-        T_reset = (53 + 32 g) / C [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+    T_reset = (53 + 32 g) / C [us].
 
     Examples
     --------
@@ -366,25 +219,11 @@ def arbitration_reset_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> 
 
 
 @published(10, symbol="T_sum", section="III-E")
+@step("T_sum")
 def gaps_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Subaction gap and arbitration reset gap together.
 
-    Parameters
-    ----------
-    gap_count
-        Gap count of the bus, 0..63 [1]; float or array.
-    gap_clock_mbit_s
-        Clock that gaps are counted in [Mbit/s]; float or array.
-
-    Returns
-    -------
-    float
-        T_sum = (82 + 48 g) / C [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+    T_sum = (82 + 48 g) / C [us].
 
     Examples
     --------
@@ -398,29 +237,8 @@ def gaps_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
 def published_nodes(available_us: Number, *, sync_us: Number, latency_us: Number, gaps_us: Number) -> Number:
     """Number of nodes as the paper publishes it.
 
-    T_lant and CTS hold N themselves, so this is exact only where they were taken at the answer. It is reported
-    as published; the capacity itself solves for N.
-
-    Parameters
-    ----------
-    available_us
-        Communication share of the period alpha T_s (the paper: 0.5 T_s) [us]; float or array.
-    sync_us
-        Time of the synchronous packet CTS [us]; float or array.
-    latency_us
-        Transaction latency T_lant; where a read and a write differ, their mean [us]; float or array.
-    gaps_us
-        Gaps T_sum after a transaction, equation (10) [us]; float or array.
-
-    Returns
-    -------
-    float
-        N = (alpha T_s - CTS) / (2 (T_lant + T_sum)) [1], not rounded; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `latency_us` and `gaps_us` add up to zero.
+    N = (alpha T_s - CTS) / (2 (T_lant + T_sum)) [1], not rounded. T_lant and CTS hold N themselves, so this is exact
+    only where they were taken at the answer. It is reported as published; the capacity itself solves for N.
 
     Examples
     --------
@@ -434,19 +252,7 @@ def published_nodes(available_us: Number, *, sync_us: Number, latency_us: Number
 def interval_latency_us(t1_us: Number, *, t2_us: Number, t3_us: Number, t4_us: Number, t5_us: Number) -> Number:
     """Latency of a transaction from the five intervals of the bench.
 
-    Parameters
-    ----------
-    t1_us, t2_us
-        Requester applies for the bus, and transmits its request until acknowledged [us]; float or array.
-    t3_us
-        Responder executes [us]; float or array.
-    t4_us, t5_us
-        Responder applies for the bus, and transmits its response until acknowledged [us]; float or array.
-
-    Returns
-    -------
-    float
-        T_lant = T1 + T2 + T3 + T4 + T5 [us]; the broadcast shape of the arguments.
+    T_lant = T1 + T2 + T3 + T4 + T5 [us].
 
     Examples
     --------
@@ -460,17 +266,7 @@ def interval_latency_us(t1_us: Number, *, t2_us: Number, t3_us: Number, t4_us: N
 def request_and_acknowledge_us(request_us: Number, *, acknowledge_us: Number) -> Number:
     """First half of a transaction, T1 + T2 of the bench.
 
-    Parameters
-    ----------
-    request_us
-        Request time T_req of equation (7) [us]; float or array.
-    acknowledge_us
-        Acknowledge time T_ack1 of equation (9) [us]; float or array.
-
-    Returns
-    -------
-    float
-        T1 + T2 = T_req + T_ack [us]; the broadcast shape of the arguments.
+    T1 + T2 = T_req + T_ack [us].
 
     Examples
     --------
@@ -484,17 +280,7 @@ def request_and_acknowledge_us(request_us: Number, *, acknowledge_us: Number) ->
 def response_and_acknowledge_us(response_us: Number, *, acknowledge_us: Number) -> Number:
     """Second half of a transaction, T4 + T5 of the bench.
 
-    Parameters
-    ----------
-    response_us
-        Response time T_resp of equation (8) [us]; float or array.
-    acknowledge_us
-        Acknowledge time T_ack2 of equation (9) [us]; float or array.
-
-    Returns
-    -------
-    float
-        T4 + T5 = T_resp + T_ack [us]; the broadcast shape of the arguments.
+    T4 + T5 = T_resp + T_ack [us].
 
     Examples
     --------
@@ -508,18 +294,8 @@ def response_and_acknowledge_us(response_us: Number, *, acknowledge_us: Number) 
 def published_request_and_acknowledge_us(payload_bytes: Number) -> Number:
     """First half of a transaction as Table I's theory column has it.
 
-    The rounded form of equation (13) at one hop, gap count 63 and S400. The terms of equations (4)-(6) add up
-    to 6.4 ns less than its constant.
-
-    Parameters
-    ----------
-    payload_bytes
-        Payload, overhead not counted [bytes]; float or array.
-
-    Returns
-    -------
-    float
-        T1 + T2 = 3.11 + 8 P / 393.216 [us]; the shape of the argument.
+    T1 + T2 = 3.11 + 8 P / 393.216 [us]. The rounded form of equation (13) at one hop, gap count 63 and S400. The terms
+    of equations (4)-(6) add up to 6.4 ns less than its constant.
 
     Examples
     --------

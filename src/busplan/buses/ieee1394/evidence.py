@@ -14,7 +14,6 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.doubts import residual
 from busplan.buses.published import published
-from busplan.elementwise import plain
 
 
 def equation_15_constant_us(_cycle: object, *, nodes: int, gap_count: int, overhead_bytes: int, rounded: bool) -> float:
@@ -47,7 +46,7 @@ def gap_counts_met(_cycle: object, *, derived: bool) -> int:
 
     def computed(hops: int) -> float:
         if not derived:
-            return plain(safe_gap_count(hops))
+            return safe_gap_count(hops)
         ticks: float = 2 * table["hop_us"] * table["base_rate_mhz"] * hops
         conditions: list[tuple[int, int]] = list(zip(table["offsets"], table["slopes"], strict=True))
         return max(ceil((ticks + offset) / slope) for offset, slope in conditions)

@@ -104,6 +104,12 @@ _LATENCIES_WITH_GAPS: Final = _of_both(
     "latency_with_gaps_us", "T_full,{}", _WITH_GAPS, "a {} and both gaps", "{} T_lant + T_sum"
 )
 _TRANSACTIONS: Final = _of_both("transaction_us", "T_{}", "idle", "what a {} takes of the cycle", "{} T_lant + idle")
+READS: Final = Figure(
+    "reads_us", "T_r", "idle", "all reads of a cycle, with their gaps", "all reads T_r", better="less"
+)
+WRITES: Final = Figure(
+    "writes_us", "T_w", "idle", "all writes of a cycle, with their gaps", "all writes T_w", better="less"
+)
 _NODES_EQ11: Final = Figure(
     "nodes_eq11",
     "N_11",
@@ -138,6 +144,13 @@ _PHASES: Final = (
         "T1+T2",
     ),
     Figure(
+        "request_and_acknowledge_eq15_us",
+        "T1+T2,15",
+        by(eq.published_request_and_acknowledge_us),
+        "first half as Table I's theory column has it: one hop, S400, gap count 63, payload of the transaction",
+        "T1+T2 by the paper's (15)",
+    ),
+    Figure(
         "hold_us",
         "hold",
         "profile",
@@ -155,9 +168,16 @@ _PHASES: Final = (
     Figure(
         "latency_us",
         "T_lant",
-        by(eq.transaction_latency_us, eq.interval_latency_us),
+        _LATENCY,
         "the whole transaction, without the gaps after it",
         "latency T_lant",
+    ),
+    Figure(
+        "interval_latency_us",
+        "T1+...+T5",
+        by(eq.interval_latency_us),
+        "latency from the five intervals of the bench, which is T_lant",
+        "T1+T2+T3+T4+T5",
     ),
     _SUBACTION_GAP,
     _RESET_GAP,
@@ -169,6 +189,7 @@ _PHASES: Final = (
     Figure("idle_us", "idle", "idle", "idle bus of the gaps, beside execution", "idle bus"),
     Figure("host_us", "host", "profile", "the host's own time beyond the gaps", "host"),
     Figure("transaction_us", "T_trans", "idle", "what the transaction takes of the cycle", "takes of the cycle"),
+    Figure("all_us", "T_r or T_w", "idle", "all reads or all writes of the cycle", "all of the cycle, T_r or T_w"),
 )
 """In the order of the bench: T1+T2, T3, T4+T5, and the gaps after them."""
 LATENCY: Final = (TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COUNT, *_PHASES)
@@ -178,11 +199,13 @@ FIGURES: Final = BusFigures(
     document_terms=(*_FIRST, *(figure for figure in TERMS if figure not in _FIRST)),
     setup=_SETUP,
     headings=(HOPS.key, GAP_COUNT.key),
-    added=(*_LATENCIES, *_TRANSACTIONS, _BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+    added=(*_LATENCIES, *_TRANSACTIONS, READS, WRITES, _BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
     counts=(_NODES_EQ11,),
     table=(
         *_LATENCIES,
         *_TRANSACTIONS,
+        READS,
+        WRITES,
         _BOTH_GAPS._replace(label="gaps T_sum, each transaction"),
         _NODES_EQ11,
         SAFE_GAP_COUNT,
@@ -192,7 +215,16 @@ FIGURES: Final = BusFigures(
     latency_rows=_PHASES,
     latency_shown=(
         *("query_us", "boards_us", "hub_wait_us", "request_and_acknowledge_us", "hold_us", "execution_us"),
-        *("response_and_acknowledge_us", "latency_us", "gaps_us", "worst_extra_us", "host_us", "transaction_us"),
+        *(
+            "response_and_acknowledge_us",
+            "latency_us",
+            "gaps_us",
+            "worst_extra_us",
+            "host_us",
+            "transaction_us",
+            "all_us",
+        ),
     ),
+    latency_main="transaction_us",
     latency_document=LATENCY,
 )

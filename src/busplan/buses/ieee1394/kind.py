@@ -37,7 +37,6 @@ from busplan.buses.limits import (
     Value,
 )
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.errors import BusplanError
 
@@ -80,7 +79,7 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
         responder=Responder(0.0),
         overhead_bytes=nodes.payload.overhead_bytes,
     )
-    return PacketTime(plain(phases.latency_us), plain(phases.subaction_gap_us))
+    return PacketTime(phases.latency_us, phases.subaction_gap_us)
 
 
 def fitted_against(network: Network, model: str) -> dict[str, Value]:
@@ -99,7 +98,7 @@ def _gap_count(network: Network) -> Setting:
     # From S800 on there are no gaps, and the table holds for some cables alone.
     if not (has_gaps(network) and network.profile.bus.cable_is_standard):
         return empty
-    safe = plain(safe_gap_count_of(network))
+    safe = safe_gap_count_of(network)
     return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
 
 
@@ -206,7 +205,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         """Say whose latency it is."""
         if is_broadcast(network):
             return ", ".join(("the data of all nodes to the host and the commands to them", *self.setup_words(network)))
-        nodes = f"{plural(int(plain(network.nodes)), 'node')}"
+        nodes = f"{plural(int(network.nodes), 'node')}"
         farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
         return ", ".join((farthest, *self.setup_words(network)))
 
@@ -257,7 +256,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         hops, cycle = hops_of(network), network.profile.cycle
         schedule = (f"broadcast schedule by {cycle.broadcast_request} requests",) if is_broadcast(network) else ()
         gaps = f"gap count {gap_count_of(network)}" if has_gaps(network) else "no gaps: lower bounds"
-        return (f"{plural(int(plain(hops)), 'hop')}", gaps, *schedule)
+        return (f"{plural(int(hops), 'hop')}", gaps, *schedule)
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
         """An unsafe gap count, and cables that the table does not hold for."""

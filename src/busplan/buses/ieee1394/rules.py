@@ -17,10 +17,10 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
-from busplan.buses.limits import Limit, nodes_limit
+from busplan.buses.limits import ExactLimit, Limit, nodes_limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules, told_apart
-from busplan.elementwise import Number, plain
+from busplan.elementwise import Number
 from busplan.english import plural
 from busplan.sections.base import TRANSACTION_KINDS
 
@@ -37,10 +37,6 @@ def _of_broadcast(value: Callable[[Network], Number]) -> Callable[[Network], Num
     return lambda network: value(network) if is_broadcast(network) else 0
 
 
-def _without_gaps(network: Network) -> int:
-    return int(not has_gaps(network))
-
-
 def _cycle_start_us(network: Network) -> Number:
     is_sent = network.profile.bus.cycle_master
     return Ieee1394Cycle(network, "standard").cycle_start_us if is_sent else 0.0
@@ -48,18 +44,42 @@ def _cycle_start_us(network: Network) -> Number:
 
 def unsafe_words(network: Network) -> str:
     """Say which gap count is unsafe for which hops, and which is the smallest safe one; of plain numbers."""
-    hops, nodes = hops_of(network), plural(int(plain(network.nodes)), "node")
+    hops, nodes = hops_of(network), plural(int(network.nodes), "node")
     cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {c.REFERENCE_CABLE_M:g} m"
     return (
-        f"gap count {gap_count_of(network)} is unsafe for {plural(int(plain(hops)), 'hop')} ({nodes}); "
+        f"gap count {gap_count_of(network)} is unsafe for {plural(int(hops), 'hop')} ({nodes}); "
         f"the smallest safe one is {safe_gap_count_of(network)}{cables}"
     )
+
+
+class UnknownArbitration(Limit):
+    """Above S400 no arbitration time is published: the cycle is a lower bound."""
+
+    key = "arbitration"
+    way_out = "up to S400 all of it is known"
+
+    def value(self, network: Network) -> Number:
+        """1 above S400."""
+        return int(not has_gaps(network))
+
+    def most(self, _network: Network) -> Number:
+        """0."""
+        return 0
+
+    def perhaps(self, network: Network) -> Number:
+        """All of the value: no cycle is known to be too long because of it."""
+        return self.value(network)
+
+    def words(self, network: Network) -> str:
+        """That it is a lower bound."""
+        speed = network.profile.bus.speed
+        return f"the arbitration of {speed} has no published time, so the cycle is a lower bound"
 
 
 _ONE_BY_ONE: Final = 'cycle.schedule = "individual" has no such limit'
 
 LIMITS: Final = (
-    Limit(
+    ExactLimit(
         "payload",
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         lambda network: network.largest_payload_bytes,
@@ -68,7 +88,7 @@ LIMITS: Final = (
         has_rule=True,
     ),
     nodes_limit("nodes", lambda: c.MAX_NODES, "bus", of="of one", has_rule=True),
-    Limit(
+    ExactLimit(
         "hops",
         "{value:.0f} hops are over the {most:.0f} of one bus",
         hops_of,
@@ -76,43 +96,36 @@ LIMITS: Final = (
         way_out="a tree with bus.max_hops = {c.MAX_HOPS:g} or less has room for {c.MAX_NODES:g} nodes",
         has_rule=True,
     ),
-    Limit(
+    ExactLimit(
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
         _of_broadcast(lambda network: network.nodes),
         lambda _network: c.MAX_BROADCAST_NODES,
         way_out=_ONE_BY_ONE,
     ),
-    Limit(
+    ExactLimit(
         "hub block",
         "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         _of_broadcast(hub_block_bytes),
         _most_payload,
         way_out=f"less read from each node, or {_ONE_BY_ONE}",
     ),
-    Limit(
+    ExactLimit(
         "write block",
         "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         _of_broadcast(write_block_bytes),
         _most_payload,
         way_out=f"less written to each node, or {_ONE_BY_ONE}",
     ),
-    Limit(
+    ExactLimit(
         "cycle starts",
         "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
         _cycle_start_us,
         lambda _network: c.CYCLE_US - c.LEAST_ASYNCHRONOUS_US,
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
-    Limit(
-        "arbitration",
-        "the arbitration of {bus.speed} has no published time, so the cycle is a lower bound",
-        _without_gaps,
-        lambda _network: 0,
-        perhaps=_without_gaps,
-        way_out="up to S400 all of it is known",
-    ),
-    Limit(
+    UnknownArbitration(),
+    ExactLimit(
         "gap table",
         unsafe_words,
         safe_gap_count_of,

@@ -15,7 +15,7 @@ from busplan.buses.ieee1394.constants import (
     c,
     padded_bytes,
 )
-from busplan.elementwise import Number, choose, is_off, larger, named, smaller, traced_with, worded
+from busplan.elementwise import Number, choose, is_off, larger, named, smaller, worded
 from busplan.sections.base import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
@@ -95,8 +95,8 @@ class Delays(NamedTuple):
             )
             acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(hops, hop_us=self.hop_us))
         else:
-            arbitration_us = traced_with(c.BETA_ARBITRATION_US, hops)
-            acknowledge_us = traced_with(c.BETA_ACKNOWLEDGE_US, hops)
+            arbitration_us = c.BETA_ARBITRATION_US
+            acknowledge_us = c.BETA_ACKNOWLEDGE_US
         return self._replace(
             link=self.link._replace(hops=hops),
             arbitration_us=named(arbitration_us, "arbitration_us", "ArbP"),
@@ -119,22 +119,19 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
     """
     rate_mbit_s, gap_count = link.data_rate_mbit_s, link.gap_count
     if not link.has_gaps:
-        beta_phy_us = traced_with(c.BETA_PHY_DELAY_US, rate_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
-        hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us), "hop_us", "hop")
+        beta_phy_us = c.BETA_PHY_DELAY_US if link.phy_delay_us is None else link.phy_delay_us
+        hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us)
         # The next packet need not wait until all nodes have one: only the way to a node and back is surely waited for.
         return Delays(link, rate_mbit_s, Gaps(0.0, 0.0, 0.0, alone), hop_us, 0.0, 0.0, 0).over(0)
-    clock_mbit_s = rate_mbit_s if model == "paper" else traced_with(c.BASE_RATE_MBIT_S, rate_mbit_s)
+    clock_mbit_s = rate_mbit_s if model == "paper" else c.BASE_RATE_MBIT_S
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
-    subaction_us = equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
-    reset_us = equations.arbitration_reset_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
-    both_us = equations.gaps_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
     gaps = Gaps(
-        named(subaction_us, "subaction_gap_us", "T_sub"),
-        named(reset_us, "arbitration_reset_gap_us", "T_reset"),
-        named(both_us, "gaps_us", "T_sum"),
+        equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s),
+        equations.arbitration_reset_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s),
+        equations.gaps_us(gap_count, gap_clock_mbit_s=clock_mbit_s),
         alone,
     )
-    hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+    hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us)
     return Delays(link, clock_mbit_s, gaps, hop_us, 0.0, 0.0, 0).over(link.hops)
 
 
@@ -240,7 +237,7 @@ def _packet_bytes(kind: TransactionKind, payload_bytes: Number) -> tuple[Number,
         )
     return (
         choose(is_quadlet, c.QUADLET_WRITE_REQUEST_BYTES, c.BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes),
-        worded(traced_with(c.WRITE_RESPONSE_BYTES, payload_bytes), c.WRITE_RESPONSE_BYTES.meaning),
+        worded(c.WRITE_RESPONSE_BYTES, c.WRITE_RESPONSE_BYTES.meaning),
     )
 
 
@@ -261,10 +258,12 @@ class Phases(NamedTuple):
     request_us: Number
     response_us: Number
     request_and_acknowledge_us: Number
+    request_and_acknowledge_eq15_us: Number
     hold_us: Number
     execution_us: Number
     response_and_acknowledge_us: Number
     latency_us: Number
+    interval_latency_us: Number
     subaction_gap_us: Number
     arbitration_reset_gap_us: Number
     gaps_us: Number
@@ -286,7 +285,7 @@ def transaction(
     responder: Responder,
     overhead_bytes: Number = 0,
 ) -> Phases:
-    """Take an asynchronous transaction apart, equations (3)-(10), (13) and (14).
+    """Take an asynchronous transaction apart, equations (3)-(10) and (12)-(15).
 
     Parameters
     ----------
@@ -310,7 +309,7 @@ def transaction(
 
     References
     ----------
-    Paper, equations (3)-(10), (13), (14); packet sizes as in `constants`.
+    Paper, equations (3)-(10), (12)-(15); packet sizes as in `constants`.
 
     Examples
     --------
@@ -358,12 +357,20 @@ def transaction(
         request_us=request_us,
         response_us=response_us,
         request_and_acknowledge_us=equations.request_and_acknowledge_us(request_us, acknowledge_us=acknowledge_us),
+        request_and_acknowledge_eq15_us=equations.published_request_and_acknowledge_us(payload_bytes),
         hold_us=hold_us,
         execution_us=execution_us,
         response_and_acknowledge_us=equations.response_and_acknowledge_us(
             response_us, acknowledge_us=response_acknowledge_us
         ),
         latency_us=latency_us,
+        interval_latency_us=equations.interval_latency_us(
+            delays.arbitration_us,
+            t2_us=request_data_us + acknowledge_us,
+            t3_us=execution_us if is_split else hold_us,
+            t4_us=delays.arbitration_us if is_split else 0.0,
+            t5_us=response_data_us + response_acknowledge_us,
+        ),
         subaction_gap_us=gaps.subaction_us,
         arbitration_reset_gap_us=gaps.arbitration_reset_us,
         gaps_us=gaps.both_us,

@@ -7,7 +7,7 @@ from busplan.buses.cycle import BusEvent
 from busplan.buses.ieee1394.constants import BETA_SPEEDS, c, safe_gap_count
 from busplan.buses.ieee1394.timing import Answer, Delays, Link, Phases, Responder, TimingModelName, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, named, plain, traced_with, worded
+from busplan.elementwise import Number, named, step, worded
 from busplan.sections.base import TransactionKind
 
 
@@ -17,6 +17,7 @@ def is_broadcast(network: Network) -> bool:
     return schedule == "broadcast"
 
 
+@step("H", "hops")
 def hops_of(network: Network) -> Number:
     """Most cable hops [1].
 
@@ -32,11 +33,13 @@ def has_gaps(network: Network) -> bool:
     return network.profile.bus.speed not in BETA_SPEEDS
 
 
+@step("g_safe", "safe_gap_count")
 def safe_gap_count_of(network: Network) -> Number:
     """Smallest safe gap count for the hops; 0 without gaps [1]."""
     return safe_gap_count(hops_of(network)) if has_gaps(network) else 0
 
 
+@step("g", "gap_count")
 def gap_count_of(network: Network) -> Number:
     """Gap count in force; 0 without gaps [1]."""
     if not has_gaps(network):
@@ -51,9 +54,9 @@ def link_of(network: Network) -> Link:
     """Rate, gap count and distance of the farthest node."""
     bus = network.profile.bus
     return Link(
-        data_rate_mbit_s=traced_with(c.by_key("DATA_RATE_MBIT_S")[bus.speed], network.nodes),
-        gap_count=named(gap_count_of(network), "gap_count", "g"),
-        hops=named(hops_of(network), "hops", "H"),
+        data_rate_mbit_s=c.by_key("DATA_RATE_MBIT_S")[bus.speed],
+        gap_count=gap_count_of(network),
+        hops=hops_of(network),
         cable_length_m=bus.cable_length_m,
         phy_delay_us=bus.phy_delay_us,
         has_gaps=has_gaps(network),
@@ -207,8 +210,8 @@ _ROUNDING_US: Final = 1e-9
 def _idle_periods(exchanged: Exchange, model: TimingModelName) -> tuple[list[BusEvent], list[BusEvent]]:
     """Idle bus before the response of a transaction, and after it: gaps, and the allowance for a faster node."""
     phases = exchanged.phases
-    sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
-    idle_us = plain(phases.idle_us)
+    sub_us, reset_us = phases.subaction_gap_us, phases.arbitration_reset_gap_us
+    idle_us = phases.idle_us
 
     def gap(kind: str, us: float, label: str) -> BusEvent:
         return BusEvent(kind, "cycle_idle_us", us, label, transaction=exchanged.kind)
@@ -220,7 +223,7 @@ def _idle_periods(exchanged: Exchange, model: TimingModelName) -> tuple[list[Bus
         ]
     if exchanged.responder.answer != "split":
         return [], [gap("arbitration_reset_gap", idle_us, "arbitration reset gap after the transaction")]
-    execution_us = plain(phases.execution_us) + plain(phases.worst_extra_us)
+    execution_us = phases.execution_us + phases.worst_extra_us
     before_us = max(sub_us - execution_us, 0.0)
     behind_us = idle_us - before_us
     # A response that comes after the arbitration reset gap leaves a subaction gap to wait for.

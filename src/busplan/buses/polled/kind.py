@@ -9,8 +9,8 @@ from busplan.buses.bus import Bus
 from busplan.buses.limits import (
     NODE_LIMIT,
     Cost,
+    ExactLimit,
     Key,
-    Limit,
     PayloadRange,
     Perturbation,
     Setting,
@@ -20,7 +20,7 @@ from busplan.buses.limits import (
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
 from busplan.buses.polled.protocols import c, protocol_of
-from busplan.elementwise import Number, larger, plain
+from busplan.elementwise import Number, larger
 
 
 def _largest_bytes(network: Network) -> Number:
@@ -36,21 +36,21 @@ def _largest_bytes(network: Network) -> Number:
 
 LIMITS: Final = (
     NODE_LIMIT,
-    Limit(
+    ExactLimit(
         "nodes",
         "{value:.0f} nodes are over the {most:.0f} of a bus",
         lambda network: network.nodes,
         lambda network: protocol_of(network.profile.bus).max_nodes,
         way_out="a second bus has room for more",
     ),
-    Limit(
+    ExactLimit(
         "payload",
         "a telegram has {value:.0f} bytes of data, over {most:.0f}",
         _largest_bytes,
         lambda network: protocol_of(network.profile.bus).max_bytes,
         way_out="a smaller payload would do",
     ),
-    Limit(
+    ExactLimit(
         "range",
         "{value:g} kbit/s are over the {most:g} of the protocol",
         lambda network: network.profile.bus.bit_rate_kbit_s,
@@ -154,7 +154,7 @@ class Polled(Bus):
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
         asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]
         adapter = (f"adapter {bus.adapter_us:g} us a request",) if bus.adapter_us else ()
-        return (name, f"{plain(bus.bit_rate_kbit_s):g} kbit/s", asked, *adapter)
+        return (name, f"{bus.bit_rate_kbit_s:g} kbit/s", asked, *adapter)
 
 
 BUS: Final = Polled()

@@ -9,7 +9,7 @@ from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind, Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos.shared import DELAYS, SercosCycle, delays, word_bytes
-from busplan.elementwise import Number, choose, named, plain, rounded_down, total
+from busplan.elementwise import Number, choose, rounded_down, step, total
 from busplan.sourced import Constants
 
 DataRate = Literal[2, 4, 8, 16]
@@ -161,12 +161,10 @@ class Sercos2Cycle(SercosCycle):
         return telegram_us(data_bytes, data_rate_mbit_s=rate, is_stuffed=self.is_stuffed)
 
     @cached_property
+    @step("s_MDT")
     def mdt_bytes(self) -> Number:
         """Data of the MDT, a record for each drive [bytes]."""
-        data_bytes = total(
-            (word_bytes(group.write_bytes) + c.RECORD_BYTES) * group.nodes for group in self.network.groups
-        )
-        return named(data_bytes, "mdt_bytes", "s_MDT")
+        return total((word_bytes(group.write_bytes) + c.RECORD_BYTES) * group.nodes for group in self.network.groups)
 
     @cached_property
     def start_us(self) -> Number:
@@ -188,7 +186,7 @@ class Sercos2Cycle(SercosCycle):
             yield Run((gap, at), group.nodes, place)
         yield BusEvent("wait", "cycle_wait_us", bus.turnaround_us, "wait after the last AT")
         mdt = BusEvent("mdt", "cycle_mdt_us", self._telegram_us(self.mdt_bytes), "MDT", transaction="mdt_stretch")
-        yield Run((mdt,), laid_out=lambda _: self._records(plain(mdt.us)))
+        yield Run((mdt,), laid_out=lambda _: self._records(mdt.us))
         yield BusEvent("wait", "cycle_wait_us", bus.recovery_us, "recovery of the drives after the MDT")
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
@@ -215,10 +213,10 @@ class Sercos2Cycle(SercosCycle):
 
     def _records(self, mdt_us: float) -> Iterator[BusEvent]:
         """The record of each drive, then all else of the MDT: flags, address, check sequence and stuff bits."""
-        rate, records_us, node = plain(self.network.profile.bus.data_rate_mbit_s), 0.0, 0
+        rate, records_us, node = self.network.profile.bus.data_rate_mbit_s, 0.0, 0
         for group in self.network.groups:
-            record_us = 8 * (plain(word_bytes(group.write_bytes)) + c.RECORD_BYTES) / rate
-            for _ in range(int(plain(group.nodes))):
+            record_us = 8 * (word_bytes(group.write_bytes) + c.RECORD_BYTES) / rate
+            for _ in range(int(group.nodes)):
                 node += 1
                 records_us += record_us
                 yield BusEvent("record", "cycle_mdt_us", record_us, "record of a drive", node, "mdt_stretch")

@@ -5,8 +5,8 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import (
     NODE_LIMIT,
+    ExactLimit,
     Key,
-    Limit,
     PayloadRange,
     Perturbation,
     TimingModel,
@@ -25,7 +25,6 @@ from busplan.buses.sercos.sercos2 import (
     c,
 )
 from busplan.buses.sercos.shared import KEYS, RULES, SercosBus, starter
-from busplan.elementwise import plain
 
 _FASTEST: Final = 16
 
@@ -33,7 +32,7 @@ LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
     nodes_limit("drives", lambda: c.MOST_DRIVES, "ring"),
-    Limit(
+    ExactLimit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
         lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
@@ -93,7 +92,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
 
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads of whole words, as many as a drive can be told to send for each of its axes."""
-        axes = min((int(plain(group.axes)) for group in network.groups), default=1)
+        axes = min((int(group.axes) for group in network.groups), default=1)
         return PayloadRange(int(c.WORD_BYTES), int(c.MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos.shared import DELAYS, word_bytes
-from busplan.elementwise import Number, choose, larger, named, rounded_down, rounded_up, smaller, traced_with
+from busplan.elementwise import Number, choose, larger, named, rounded_down, rounded_up, smaller, step
 from busplan.sections.base import TransactionKind
 from busplan.sourced import Constants
 
@@ -129,6 +129,7 @@ def telegrams_us(filling: Filling, *, gap_bytes: Number) -> Number:
     return (filling.data_bytes + filling.telegrams * (c.OVERHEAD_BYTES + gap_bytes)) * c.BYTE_US
 
 
+@step("J")
 def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
     """Jitter of the synchronisation: half of the master's and of the gap [us].
 
@@ -140,6 +141,7 @@ def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
     return (master_jitter_us + gap_bytes * c.BYTE_US) / 2
 
 
+@step("t_ring")
 def ring_delay_us(
     devices: Number, *, device_delay_us: Number, gap_bytes: Number, component_delay_us: Number = 0.0
 ) -> Number:
@@ -250,7 +252,7 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
     """
     is_in_all = network.profile.bus.hot_plug_field == "all"
     sizes = (group.write_bytes if kind == "write" else group.read_bytes for group in network.groups)
-    first_bytes = traced_with(c.HOT_PLUG_BYTES, network.nodes)
+    first_bytes: Number = c.HOT_PLUG_BYTES
     if kind == "write":
         first_bytes = first_bytes + c.EXTENDED_BYTES + (c.ALIGNED_BYTES if is_in_all else 0)
     return Telegrams(

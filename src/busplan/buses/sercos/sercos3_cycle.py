@@ -23,7 +23,7 @@ from busplan.buses.sercos.sercos3 import (
     telegrams_us,
 )
 from busplan.buses.sercos.shared import SercosCycle, delays
-from busplan.elementwise import Number, choose, larger, named, plain, smaller, total
+from busplan.elementwise import Number, choose, larger, smaller, total
 from busplan.sections.base import TransactionKind
 
 TimingModelName = Literal["window", "telegrams"]
@@ -87,7 +87,7 @@ class Sercos3Cycle(SercosCycle):
     def jitter_us(self) -> Number:
         """Jitter of the synchronisation [us]."""
         bus = self.network.profile.bus
-        return named(sync_jitter_us(bus.master_jitter_us, gap_bytes=bus.gap_bytes), "sync_jitter_us", "J")
+        return sync_jitter_us(bus.master_jitter_us, gap_bytes=bus.gap_bytes)
 
     @cached_property
     def ring_us(self) -> Number:
@@ -96,13 +96,12 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window:
             return 0.0
         delay_us: Number = bus.device_delay_us
-        around_us = ring_delay_us(
+        return ring_delay_us(
             self.network.nodes,
             device_delay_us=delay_us,
             gap_bytes=bus.gap_bytes,
             component_delay_us=bus.component_delay_us,
         )
-        return named(around_us, "ring_delay_us", "t_ring")
 
     @property
     def _jitters(self) -> tuple[int, int]:
@@ -229,19 +228,19 @@ class Sercos3Cycle(SercosCycle):
             yield BusEvent(f"{sort}_frame", term, head_us, f"{label}: its own fields", None, sort)
             for size, node in data:
                 yield BusEvent(f"{sort}_data", term, size * c.BYTE_US, f"{label}: data of a device", node, sort)
-            padding_us = (plain(padded_bytes(used)) - used) * c.BYTE_US
+            padding_us = (padded_bytes(used) - used) * c.BYTE_US
             yield BusEvent("gap", term, padding_us + gap * c.BYTE_US, f"gap after {label}", None, sort)
 
 
 def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
     """The pieces of each telegram of plain numbers: bytes, and the device whose data they are; 0 for other fields."""
-    laid_out = [[(plain(telegrams.first_bytes), 0)]]
-    used, node = plain(telegrams.first_bytes), 0
+    laid_out = [[(telegrams.first_bytes, 0)]]
+    used, node = telegrams.first_bytes, 0
     for place, items in enumerate(telegrams.items):
-        size, has_owner = plain(items.size_bytes), place >= _FIELDS
-        for _ in range(int(plain(items.pieces))):
+        size, has_owner = items.size_bytes, place >= _FIELDS
+        for _ in range(int(items.pieces)):
             if used + size > c.MOST_BYTES:
-                used = plain(telegrams.next_bytes)
+                used = telegrams.next_bytes
                 laid_out.append([(used, 0)])
             node += has_owner
             laid_out[-1].append((size, node if has_owner else 0))

@@ -7,8 +7,8 @@ from typing import ClassVar, Final
 from busplan.buses.limits import (
     NODE_LIMIT,
     Cost,
+    ExactLimit,
     Key,
-    Limit,
     PayloadRange,
     Perturbation,
     Setting,
@@ -27,7 +27,7 @@ from busplan.buses.sercos.sercos3 import (
 )
 from busplan.buses.sercos.sercos3_cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos.shared import KEYS, RULES, SercosBus, starter
-from busplan.elementwise import Number, larger, plain
+from busplan.elementwise import Number, larger
 
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
@@ -45,14 +45,14 @@ LIMITS: Final = (
     period_limit(PERIODS),
     NODE_LIMIT,
     nodes_limit("devices", lambda: c.MOST_DEVICES, "network"),
-    Limit(
+    ExactLimit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
         _largest_telegram,
         lambda _network: c.MOST_BYTES,
         way_out="a smaller payload would do",
     ),
-    Limit(
+    ExactLimit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
         _most_telegrams,
@@ -122,7 +122,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads of whole words: four telegrams carry those of all devices, one telegram that of a device."""
-        share = int(c.MOST_TELEGRAMS * c.MOST_BYTES) // int(plain(network.nodes))
+        share = int(c.MOST_TELEGRAMS * c.MOST_BYTES) // int(network.nodes)
         return PayloadRange(
             int(c.WORD_BYTES), min(share, int(c.MOST_BYTES - c.CONNECTION_BYTES)), carrier="four telegrams"
         )
@@ -134,7 +134,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - whatever their number
         """A channel for other frames that the master does not open."""
-        given_us = plain(network.nonperiodic_us)
+        given_us = network.nonperiodic_us
         if not 0 < given_us < c.LEAST_UCC_US:
             return []
         why = f"the master opens no channel for other frames of less than {c.LEAST_UCC_US:g} us"

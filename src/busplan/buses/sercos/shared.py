@@ -12,7 +12,7 @@ from busplan.buses.figure import Figure
 from busplan.buses.limits import Key, Starter, unknown_period
 from busplan.buses.network import Network
 from busplan.buses.rule import read_rules
-from busplan.elementwise import Number, larger, plain, rounded_up, total
+from busplan.elementwise import Number, larger, rounded_up, total
 from busplan.sourced import Constants
 
 c: Final = Constants("busplan.buses.sercos", "shared.toml")
@@ -112,11 +112,11 @@ class SercosCycle(BusCycle):
     def arrival_us(self, node: int) -> float:  # noqa: ARG002 - all at once
         """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
         _, command = self.latencies()
-        return plain(command.phases["delay_us"]) - plain(command.phases["node_us"])
+        return command.phases["delay_us"] - command.phases["node_us"]
 
     def sampled_us(self) -> float:
         """All nodes sample at once, early enough for the slowest of them [us]."""
-        return plain(self.feedback_due_us) - plain(_slowest_read_us(self.network))
+        return self.feedback_due_us - _slowest_read_us(self.network)
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
@@ -124,8 +124,8 @@ class SercosCycle(BusCycle):
         if not at_sync:
             return pipeline
         _, command = self.latencies()
-        late_us = plain(command.phases["delay_us"]) - self.sampled_us()
-        return pipeline + ceil(late_us / plain(self.network.period_us))
+        late_us = command.phases["delay_us"] - self.sampled_us()
+        return pipeline + ceil(late_us / self.network.period_us)
 
 
 class SercosBus(Bus):

@@ -7,7 +7,6 @@ from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, 
 from busplan.buses.limits import Value as BusValue
 from busplan.buses.network import Network
 from busplan.buses.published import parts_tested
-from busplan.elementwise import plain
 from busplan.forms.blocks import (
     Code,
     JsonDocument,
@@ -69,7 +68,7 @@ def change_meanings(bus: "Bus") -> dict[str, str]:
 
 def warning_sentences(network: Network) -> Iterator[Sentence]:
     """Warnings for a network with its own number of nodes; they hold whatever the verdict."""
-    warnings = network.bus.warnings(network, nodes=[int(plain(network.nodes))])
+    warnings = network.bus.warnings(network, nodes=[int(network.nodes)])
     return (Sentence((f"Warning: {words}.",), "warns") for words in warnings)
 
 

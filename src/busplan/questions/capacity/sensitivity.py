@@ -9,7 +9,6 @@ from typing import Any, Final, NamedTuple
 from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.limits import Perturbation
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import FITS, TIME, certainty
 from busplan.questions.fit.figures import FitFigures, figures, limits_behind, safe_nodes
@@ -67,7 +66,7 @@ def next_bottleneck(network: Network) -> NextBottleneck:
     )
     cycles = (bus.cycle(without_cause, model=bus.deciding_model) for without_cause in without_causes)
     without = next(
-        (cycle for cycle in cycles if not any(plain(term.us) for term in cycle.terms if term.key == binding.key)), None
+        (cycle for cycle in cycles if not any(term.us for term in cycle.terms if term.key == binding.key)), None
     )
     limits = []
     for group in network.names:
@@ -77,12 +76,12 @@ def next_bottleneck(network: Network) -> NextBottleneck:
         limits=tuple(limits),
         binding_term=binding,
         next_binding_term=_largest(without or cycle, but=binding.key),
-        next_margin_corrected_us=None if without is None else plain(certainty(without).margin_corrected_us),
+        next_margin_corrected_us=None if without is None else certainty(without).margin_corrected_us,
     )
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
-    return max((term for term in cycle.terms if term.key != but), key=lambda term: plain(term.us))
+    return max((term for term in cycle.terms if term.key != but), key=lambda term: term.us)
 
 
 _MORE_EXECUTION: Final = 0.1
@@ -246,7 +245,7 @@ def reaches(network: Network) -> Iterator[Reach]:
         A network that is shown to fit.
     """
     bus = network.bus
-    if any(plain(group.read_execution_us) or plain(group.write_execution_us) for group in network.groups):
+    if any(group.read_execution_us or group.write_execution_us for group in network.groups):
         yield _reach("execution times, factor", "execution", 1.0, partial(slower, network))
     for group in network.profile.node_groups:
         nodes, limit = safe_nodes(network, group=group.name)
@@ -341,9 +340,9 @@ def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
     """Say how much nearer a change comes to each limit that is a time; the distance is from its value plus U."""
     for limit in network.bus.limits:
-        if limit.doubt is None:
+        if not limit.has_doubt:
             continue
-        left_us, then_us = (plain(limit.most(of)) - plain(limit.shown.value(of)) for of in (network, changed))
+        left_us, then_us = (limit.most(of) - limit.shown.value(of) for of in (network, changed))
         if then_us < left_us and left_us > 0:
             yield f"it takes {left_us - then_us:.1f} us of the {left_us:.1f} us before the limit of {limit.key}"
         elif then_us < left_us:

@@ -6,7 +6,6 @@ from typing import Final
 
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
@@ -269,8 +268,8 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, network: Network) -> Senten
     now, next_term = bottleneck.binding_term, bottleneck.next_binding_term
     labels = by_key(network.bus.figures.terms)
     label, next_label = labels[now.key].label, labels[next_term.key].label
-    us = ShownValue(now.us, "binding_term_us", "us", known_decimals(plain(now.us), None))
-    next_us = ShownValue(next_term.us, "next_binding_term_us", "us", known_decimals(plain(next_term.us), None))
+    us = ShownValue(now.us, "binding_term_us", "us", known_decimals(now.us, None))
+    next_us = ShownValue(next_term.us, "next_binding_term_us", "us", known_decimals(next_term.us, None))
     if bottleneck.next_margin_corrected_us is not None:
         margin_us = bottleneck.next_margin_corrected_us
         margin = ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from busplan.buses.cycle import RestsOn
 from busplan.buses.network import Network
 from busplan.buses.rule import contradicts
-from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.elementwise import FIT_ROUNDING
 from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
@@ -276,7 +276,7 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     limit = network.bus.limit("load")
     if limit is None:
         return None
-    load, most = plain(limit.value(network)), plain(limit.most(network))
+    load, most = limit.value(network), limit.most(network)
     whole = max(1.0, load)
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 
@@ -397,8 +397,8 @@ def _basis(verdict: Verdict) -> Iterator[_Line]:
     """The largest part and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
     figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
     if figures.terms:
-        largest = max(figures.terms, key=lambda term: plain(term.us))
-        us = known_text(plain(largest.us), figures.uncertainty_us)
+        largest = max(figures.terms, key=lambda term: term.us)
+        us = known_text(largest.us, figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:

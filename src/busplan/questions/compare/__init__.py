@@ -8,7 +8,6 @@ from typing import Final, NamedTuple
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.buses.bus import Bus
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -274,7 +273,7 @@ def _most_axes(network: Network, best: SettingForPeriod | None) -> SafeAxes:
     as_set = _safe_axes(network)
     if best is None:
         return as_set
-    period_us = float(plain(network.period_us))
+    period_us = float(network.period_us)
     with_best = _safe_axes(at_period(changed(network, best.changes), period_us))
     return max(as_set, with_best, key=lambda safe: safe.nodes)
 

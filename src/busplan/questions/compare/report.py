@@ -7,7 +7,6 @@ from typing import Final
 from busplan.buses.figure import SAFE_AXES, VERDICT, Ink
 from busplan.buses.network import Network
 from busplan.buses.published import parts_tested
-from busplan.elementwise import plain
 from busplan.english import listed, nouns, plural
 from busplan.forms.blocks import (
     Block,
@@ -84,8 +83,8 @@ def compare_report(answer: CompareAnswer) -> Report:
             profile=answer.profile.name,
             kind=answer.profile.bus.kind,
             period_us=answer.profile.cycle.period_us,
-            nodes=int(plain(answer.network.nodes)),
-            axes=int(plain(answer.network.axes)),
+            nodes=int(answer.network.nodes),
+            axes=int(answer.network.axes),
             group=answer.counted or None,
             buses=records,
         ),
@@ -250,7 +249,7 @@ def _left_out(answer: CompareAnswer) -> Iterator[Sentence]:
 def _drawing(answer: CompareAnswer, *, title: str) -> Drawing:
     """The most axes over the period: a curve for each kind of bus, and this machine as a line across and one up."""
     compared, own_us = answer.compared, answer.profile.cycle.period_us
-    own_axes = int(plain(answer.network.axes))
+    own_axes = int(answer.network.axes)
     points = [point for machine in compared for point in machine.curve]
     periods_us, top = sorted({point.period_us for point in points}), max(point.axes or 1 for point in points)
     machine_now = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")

@@ -14,7 +14,6 @@ from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle
 from busplan.buses.limits import COVERAGE
 from busplan.buses.published import Tested, parts_tested, published
-from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -231,7 +230,7 @@ class _Case:
 
     def uncertainty(self, key: str) -> float:
         """Expanded uncertainty from the doubts of a key."""
-        doubts = [plain(doubt.us) for doubt in self._figures.doubts if doubt.key == key]
+        doubts = [doubt.us for doubt in self._figures.doubts if doubt.key == key]
         if not doubts:
             raise BusplanError(f"doubt: {key!r} is no doubt of {self.profile.name}")
         return COVERAGE * hypot(*doubts)

@@ -13,7 +13,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure, by_key, term_name
 from busplan.buses.network import Network
-from busplan.elementwise import Number, Traced, value_of
+from busplan.elementwise import Number, Traced, TracedConstant, value_of, worded
 from busplan.english import listed
 from busplan.errors import BusplanError
 from busplan.questions.explain.formula import formula_text, inputs, lines
@@ -21,7 +21,7 @@ from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures
 from busplan.questions.fit.graded import choosing_keys, traced_network
 from busplan.questions.fit.network import model_names
-from busplan.sourced import Input, Sourced, short
+from busplan.sourced import Input, constants_looked_up, short
 
 CommandName = Literal["capacity", "latency"]
 _Numbers = Mapping[str, Traced]
@@ -196,10 +196,17 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
     dict
         Numbers; an infinite one does not exist.
     """
+    figures = figures_of(network.bus)[command]
     # Traced for each command: a number keeps the name that it is given first.
     network = traced_network(network)
+    with constants_looked_up(TracedConstant):
+        return _numbers_of(network, command, model, figures)
+
+
+def _numbers_of(
+    network: Network, command: CommandName, model: str, figures: Mapping[str, Figure]
+) -> dict[str, _Numbers]:
     cycle = network.bus.cycle(network, model=model)
-    figures = figures_of(network.bus)[command]
     if command == "capacity":
         return {"": _traced(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), figures)}
     nodes = network.nodes
@@ -233,10 +240,10 @@ def _traced(numbers: Mapping[str, Number | None], figures: Mapping[str, Figure])
 
 def _named(number: Number, key: str, symbol: str) -> Traced:
     """Name a number; a constant becomes a line of its own."""
+    if isinstance(number, TracedConstant):
+        number = worded(number, number.meaning)
     if isinstance(number, Traced):
         return number.named(key, symbol)
-    if isinstance(number, Sourced):
-        return Traced(float(number), formula=number.meaning, numbers=short(number), parts=(number,)).named(key, symbol)
     return Traced(number, formula=short(number), numbers=short(number)).named(key, symbol)
 
 
@@ -297,7 +304,7 @@ def wanted(name: str, network: Network) -> Wanted:
     if transactions or (name and name in network.names):
         # All other figures of `latency` lead to this one.
         timed = network.bus.figures
-        main = timed.deadlines[0] if timed.deadlines else timed.latency_table[-1].key
+        main = timed.deadlines[0] if timed.deadlines else timed.latency_main or timed.latency_table[-1].key
         return Wanted("latency", (register["latency"][main],), transactions or None)
     raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
 

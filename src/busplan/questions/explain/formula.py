@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from inspect import signature
 from typing import Final
 
-from busplan.elementwise import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Number, Traced, value_of
-from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, input_of, short
+from busplan.elementwise import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Number, Traced, TracedConstant, value_of
+from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, constants_looked_up, input_of, short
 
 _ATOM: Final = 4
 _MOST_TERMS: Final = 24
@@ -92,8 +92,8 @@ def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[s
         return _atom(short(operand.value) if in_numbers or not operand.symbol else operand.symbol)
     if operand.operation == CHOSEN:
         chosen = operand.parts[0]
-        if isinstance(chosen, Sourced) and not in_numbers:
-            return _atom(chosen.symbol or chosen.meaning)
+        if isinstance(chosen, TracedConstant) and not in_numbers:
+            return _atom(chosen.constant.symbol or chosen.meaning)
         return _written(chosen, in_numbers=in_numbers)
     terms = _chained(operand)
     if len(terms) > _MOST_TERMS:
@@ -159,8 +159,9 @@ def formula_of(equation: Equation) -> str:
     names = list(signature(equation.function).parameters)
     # Any number but 0 and 1, which truth values equal.
     first, *rest = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
-    result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
-    return result.symbol or formula_text(result, in_numbers=False)
+    with constants_looked_up(TracedConstant):
+        result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
+    return result.symbol if result is first else formula_text(result, in_numbers=False)
 
 
 def lines(figure: Traced) -> Iterator[Traced]:

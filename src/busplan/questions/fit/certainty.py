@@ -6,7 +6,7 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
-from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
+from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, ExactLimit, Held
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
@@ -114,20 +114,20 @@ def is_shown_to_fit(network: Network) -> bool:
     return bool(is_in_time) and not any(limit.shown.is_broken(network) for limit in limits)
 
 
-def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
+def limits_with_time(network: Network, *, model: str) -> tuple[Held, ...]:
     """Limits of a network's kind of bus at nominal values, without the safety limits; time is the last."""
     bus = network.bus
     time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
     return (*(limit.nominal for limit in bus.limits if limit.role != "safety"), time)
 
 
-def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
+def limits_to_be_safe(network: Network) -> tuple[Held, ...]:
     """Every limit that a network must keep to be shown to fit on a bus with safe settings; time is the last."""
     bus = network.bus
     time = time_limit(lambda tried: certainty(bus.cycle(tried, model=bus.deciding_model)).safe_required_us)
     return (*(limit.shown for limit in bus.limits), time)
 
 
-def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
+def time_limit(needed_us: Callable[[Network], Number]) -> Held:
     """The time limit: the time that a network needs must not exceed the available time [us]."""
-    return Limit(TIME, "{value:.3f} us needed of {most:.3f} us", needed_us, available_us)
+    return ExactLimit(TIME, "{value:.3f} us needed of {most:.3f} us", needed_us, available_us).nominal

@@ -7,7 +7,6 @@ from typing import Any, Final, Literal
 
 from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.questions.fit.certainty import available_us, deciding_cycle, fits_in
 from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -63,19 +62,19 @@ def skew_us(network: Network) -> float:
 
 def jitter_us(network: Network) -> float:
     """Jitter of the synchronous packet, +/- about its mean: the profile's own and what the bus adds [us]."""
-    return plain(network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us())
+    return float(network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us())
 
 
 def _command_effects_us(cycle: BusCycle) -> tuple[float, float]:
     """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
     network = cycle.network
-    ends = list(accumulate(int(plain(group.nodes)) for group in network.groups))
+    ends = list(accumulate(int(group.nodes) for group in network.groups))
     with_axes = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
     in_every_cycle = [place for place in with_axes if not network.groups[place].is_slower] or with_axes
 
     def effect_us(place: int, node: int) -> float:
         # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
-        return min(cycle.arrival_us(node), plain(network.period_us)) + cycle.taking_us(network.groups[place])
+        return min(cycle.arrival_us(node), network.period_us) + cycle.taking_us(network.groups[place])
 
     first, last = in_every_cycle[0], in_every_cycle[-1]
     return effect_us(first, [0, *ends][first] + 1), effect_us(last, ends[last])

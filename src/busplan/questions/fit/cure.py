@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
-from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import FitFigures
 from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
@@ -312,7 +312,7 @@ def _with(start: Variant, changes: Sequence[Changes]) -> Variant:
 
 def _lack(needs: Sequence[Need], network: Network) -> tuple[int, float]:
     """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
-    periods_us = [need.period_us(float(plain(network.slice_ratio))) for need in needs]
+    periods_us = [need.period_us(float(network.slice_ratio)) for need in needs]
     return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
 
 
@@ -332,14 +332,14 @@ def _values(freedom: Freedom, now: Variant, kept: Collection[str]) -> Iterator[C
             return _fewer_nodes(now)
     # A setting of the bus is safe for all nodes that [limits] asks for.
     network = now.network
-    largest = max((network, *(room.network for room in rooms(network))), key=lambda room: float(plain(room.nodes)))
+    largest = max((network, *(room.network for room in rooms(network))), key=lambda room: float(room.nodes))
     settings = (setting for setting in network.bus.settings(largest) if setting.name == freedom.name)
     return (values for setting in settings for values in setting.values)
 
 
 def _ratios(now: Variant) -> Iterator[Changes]:
     """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
-    own, period_us = float(plain(now.network.slice_ratio)), float(plain(now.network.period_us))
+    own, period_us = float(now.network.slice_ratio), float(now.network.period_us)
     slice_us = max((need.slice_us for need in now.unmet() if need.slice_us < inf), default=0.0)
     ratio = min(ceil(_RATIO_STEPS * slice_us / period_us * (1 - FIT_ROUNDING)) / _RATIO_STEPS, MOST_RATIO)
     if ratio > own:
@@ -387,7 +387,7 @@ def _periods(now: Variant) -> Iterator[Changes]:
     least_us = now.variants.smallest.us
     if least_us is None:
         return
-    periods, own_us = now.network.bus.periods, float(plain(now.network.period_us))
+    periods, own_us = now.network.bus.periods, float(now.network.period_us)
     if periods.us:
         allowed = (us for us in periods.us if us >= least_us)
         yield from ({PERIOD: us} for us in sorted(allowed, key=lambda us: abs(us - own_us)))
@@ -409,7 +409,7 @@ def rounded_up(us: float) -> float:
 
 def _fewer_nodes(now: Variant) -> Iterator[Changes]:
     """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
-    counts = range(int(plain(now.network.nodes)) - 1, 0, -1)
+    counts = range(int(now.network.nodes) - 1, 0, -1)
     place = bisect_left(counts, x=True, key=lambda nodes: now.holds({NODES: nodes}))
     if counts:
         yield {NODES: counts[min(place, len(counts) - 1)]}
@@ -441,8 +441,8 @@ def cure(network: Network, variants: Variants | None = None) -> Cure:
 
 def stands_in_the_way(network: Network, step: PlanStep) -> Need:
     """The constraint that a step does not hold, with its words."""
-    ratio = float(step.changes.get(RATIO, plain(network.slice_ratio)))
-    period_us = float(step.changes.get(PERIOD, plain(network.period_us)))
+    ratio = float(step.changes.get(RATIO, network.slice_ratio))
+    period_us = float(step.changes.get(PERIOD, network.period_us))
     need = most_asking(step.unmet, ratio=ratio)
     return need._replace(why=need.words(ratio=ratio, most_us=period_us))
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Held, Limit
 from busplan.buses.network import Network
-from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, existing, is_everywhere, larger, plain, rounded_down, smaller, total
+from busplan.buses.time_slice import time_slice_us
+from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,
     NOT_SHOWN,
@@ -43,13 +43,13 @@ class MostNodes(NamedTuple):
 
     nodes: Number
     limit: Number
-    limits: Sequence[Limit]
+    limits: Sequence[Held]
     """The limits that were tried."""
 
     @property
     def words(self) -> tuple[int, str]:
         """The number of nodes and the key of the limit, of plain numbers."""
-        return int(plain(self.nodes)), self.limits[int(plain(self.limit))].key
+        return int(self.nodes), self.limits[int(self.limit)].key
 
     def words_at(self, points: int) -> list[tuple[int, str]]:
         """The same at each point of arrays."""
@@ -100,12 +100,12 @@ def most_and_safe_nodes(
     if model != network.bus.deciding_model:
         return most, None
     # No more nodes are shown to fit than fit.
-    ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else plain(most.nodes)) + 1
+    ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else most.nodes) + 1
     return most, most_nodes(with_nodes, limits_to_be_safe(network), ceiling=min(ceiling, MAX_COUNT))
 
 
 def most_nodes(
-    with_nodes: Callable[[Number], Network], limits: Sequence[Limit], *, ceiling: int = MAX_COUNT
+    with_nodes: Callable[[Number], Network], limits: Sequence[Held], *, ceiling: int = MAX_COUNT
 ) -> MostNodes:
     """Find the largest number of nodes that keeps every limit; of several limits that set it, the first is named.
 
@@ -136,7 +136,7 @@ def _most_nodes(with_nodes: Callable[[Number], Network], limits: Sequence[Limit]
     order = sorted(range(len(limits)), key=lambda index: limits[index].is_slow)
     for place, index in enumerate(order):
         # One above the ceiling, so that a limit that allows the ceiling is not taken for the limit that sets it.
-        still_allowed = int(nodes.max() if hasattr(nodes, "max") else plain(nodes))
+        still_allowed = int(nodes.max() if hasattr(nodes, "max") else nodes)
         most[index] = _most_within(limits[index], with_nodes, still_allowed + 1)
         nodes = smaller(nodes, most[index])
         if is_everywhere(nodes < 1) and index < min(order[place + 1 :], default=index):
@@ -153,7 +153,7 @@ _HALVED_EVERY: Final = 3
 """One step of a search in so many halves the range, whatever the values say."""
 
 
-def _most_within(limit: Limit, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
+def _most_within(limit: Held, with_nodes: Callable[[Number], Network], ceiling: int) -> Number:
     """The largest number of nodes that keeps one limit; every larger number breaks it.
 
     A value grows almost as the nodes do: the next number tried lies on the line between the last two.
@@ -436,7 +436,7 @@ class FitNumbers(NamedTuple):
             verdict=VERDICTS[int(verdict_code(self.codes))] if self.decides else None,
             doubts=self.doubts,
             terms=self.terms,
-            binding_term=max(self.terms, key=lambda term: plain(term.us)).name if self.terms else None,
+            binding_term=max(self.terms, key=lambda term: term.us).name if self.terms else None,
             exceeded=exceeded,
             fits=not exceeded,
             safe=not self.unsafe,
@@ -534,7 +534,7 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "available_us": given_us,
         "required_us": required_us,
         "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),
-        "required_time_slice_us": required_time_slice_us(required_us, nodes=nodes),
+        "required_time_slice_us": cycle.required_time_slice_us,
         "utilisation": required_us / given_us,
         "margin_us": margin_us(required_us, available_us=given_us),
         "min_period_us": shortest_period_us(network, required_us),
@@ -565,7 +565,7 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     bus = network.bus
     period_us = bus.periods.shortest_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
-        if limit.period is not None and not limit.is_slow:
+        if limit.has_period and not limit.is_slow:
             kept = limit.shown if is_shown else limit.nominal
             period_us = larger(period_us, bus.periods.shortest_us(kept.shortest_period_us(network)))
     return period_us

@@ -8,7 +8,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.limits import Key
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleFigures
-from busplan.elementwise import GivenTable, Traced, plain
+from busplan.elementwise import GivenTable, Traced
 from busplan.profile.document import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
 from busplan.questions.fit.network import at_once, bus_of, trial
@@ -180,7 +180,7 @@ def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssu
     shares: list[_Share] = [
         ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
     ]
-    shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
+    shares += [((term.rests_on,), term.us / figures.required_us, "the required time") for term in figures.terms]
     # Only keys of the profile have a grade. Execution times come below: they share terms and uncertainty components.
     shares = [share for share in shares if share[1] > _HEAVY_SHARE and _is_assumed(profile, share[0][0])]
     shares += _execution_shares(figures, network, variance)
@@ -213,9 +213,9 @@ def _execution_shares(figures: RuleFigures, network: Network, variance: float) -
         sum(float(doubt.us) for doubt in doubts if doubt.key.endswith(f".{_EXECUTION}"))
         for doubts in (figures.doubts, cycle.doubts())
     )
-    rest = {term.key: plain(term.us) for term in cycle.terms}
+    rest = {term.key: term.us for term in cycle.terms}
     # A term that grows without execution times, such as the wait for a gap, is not due to them.
-    carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
+    carried_us = sum(max(0.0, term.us - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
     return [(keys, whole_us * (whole_us - rest_us) / variance, "the variance"), of_time] if variance else [of_time]
 
@@ -232,6 +232,6 @@ def _rate_shares(figures: RuleFigures, network: Network) -> Iterator[_Share]:
         unlimited = trial(network, {key: _INFINITE_KBIT_S})
         if network.groups:
             cycle = bus.cycle(unlimited._replace(period_us=figures.period_us), model=figures.timing_model)
-            yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
+            yield (key,), 1 - cycle.required_us / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
-            yield (key,), 1 - plain(load.value(unlimited)) / plain(load.value(network)), "the load"
+            yield (key,), 1 - load.value(unlimited) / load.value(network), "the load"

@@ -6,7 +6,6 @@ from math import prod
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import (
     CapacityFigures,
@@ -140,7 +139,7 @@ def _nodes_with(axes: object, network: Network, *, nodes_key: str) -> int:
     """
     varied = next(nodes for nodes in network.profile.node_groups if nodes.nodes_key == nodes_key)
     node_axes = int(varied.node.axes)
-    other_axes = int(plain(network.axes)) - int(varied.nodes) * node_axes
+    other_axes = int(network.axes) - int(varied.nodes) * node_axes
     varied_axes = axes - other_axes if isinstance(axes, int) else 0
     if varied_axes < max(node_axes, 1) or not node_axes or varied_axes % node_axes:
         beside = f" beside {other_axes} others" if other_axes else ""

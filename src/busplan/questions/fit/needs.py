@@ -5,7 +5,7 @@ from math import ceil, inf
 from typing import Final, NamedTuple
 
 from busplan.buses.network import Network
-from busplan.elementwise import plain, within
+from busplan.elementwise import within
 from busplan.questions.fit.certainty import TIME, available_us, certainty
 from busplan.questions.fit.network import at_period
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
@@ -95,9 +95,9 @@ def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
             continue
         # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
         at_us = max(time.slice_us, least_us, MIN_STEP_US)
-        at = network if limit.period is None else network._replace(period_us=at_us)
+        at = network._replace(period_us=at_us) if limit.has_period else network
         if limit.shown.is_broken(at):
-            kept_us = plain(limit.shown.shortest_period_us(at))
+            kept_us = limit.shown.shortest_period_us(at)
             if kept_us == inf:
                 way_out = f" ({limit.advice(at)})" if limit.way_out else ""
                 yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
@@ -147,7 +147,7 @@ def missed_limits(network: Network) -> tuple[MissedLimit, ...]:
     """
     if not network.groups:
         return ()
-    ratio, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
+    ratio, period_us = float(network.slice_ratio), float(network.period_us)
     missed = [
         MissedLimit(need.key, "", need.words(ratio=ratio, most_us=period_us))
         for need in _unmet(_of_use(network), network)
@@ -155,7 +155,7 @@ def missed_limits(network: Network) -> tuple[MissedLimit, ...]:
     for room in rooms(network):
         broken = next((limit for limit in network.bus.limits if limit.shown.is_broken(room.network)), None)
         time = next(to_be_shown(room.network))
-        if broken is not None or not within(time.slice_us, float(plain(available_us(network)))):
+        if broken is not None or not within(time.slice_us, float(available_us(network))):
             why = time.words(ratio=ratio, most_us=period_us) if broken is None else broken.words(room.network)
             missed.append(MissedLimit(room.key, room.group, f"{room.key} asks for room for {room.words}: {why}"))
     return tuple(missed)
@@ -181,13 +181,13 @@ def unmet(network: Network, needs: Iterable[Need] | None = None) -> list[Need]:
     found = list(_unmet(needs_of(network) if needs is None else needs, network))
     if not broken and not found:
         # What a limit needs of the slice was computed at the shortest period.
-        broken = [limit for limit in limits if limit.period is not None and limit.shown.is_broken(network)]
+        broken = [limit for limit in limits if limit.has_period and limit.shown.is_broken(network)]
         found = [Need(inf, missed.key, missed.words) for missed in missed_limits(network)]
     return [*(Need(inf, limit.key, limit.words(network)) for limit in broken), *found]
 
 
 def _unmet(needs: Iterable[Need], network: Network) -> Iterator[Need]:
-    ratio, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
+    ratio, period_us = float(network.slice_ratio), float(network.period_us)
     return (need for need in needs if not within(need.period_us(ratio), period_us))
 
 
@@ -218,7 +218,7 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
     with_limits
         Whether [limits] must hold, too.
     """
-    bus, ratio = network.bus, float(plain(network.slice_ratio))
+    bus, ratio = network.bus, float(network.slice_ratio)
 
     def most(at: Network) -> Need:
         more = _of_limits(at) if with_limits else ()
@@ -227,7 +227,7 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
     def missing(period_us: float) -> Need | None:
         at = at_period(network, period_us)
         need = most(at)
-        broken = any(limit.period is not None and limit.shown.is_broken(at) for limit in bus.limits)
+        broken = any(limit.has_period and limit.shown.is_broken(at) for limit in bus.limits)
         is_missed = broken or not within(need.period_us(ratio), period_us) or (with_limits and missed_limits(at))
         return need if is_missed else None
 
@@ -246,4 +246,4 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
 
 def _allowed_us(network: Network, least_us: float) -> float:
     """The shortest period of at least a time that a bus allows; infinite where there is none [us]."""
-    return float(plain(network.bus.periods.shortest_us(max(MIN_STEP_US, least_us))))
+    return float(network.bus.periods.shortest_us(max(MIN_STEP_US, least_us)))

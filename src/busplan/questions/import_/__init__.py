@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Code, Report, Sentence, ShownValue, Table, TableColumn, TableRow, sentence
 from busplan.profile.document import decode, validate
@@ -204,7 +203,7 @@ def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
     """The load of the plan beside that of the log."""
     bus: Any = profile.bus
     cycle: Any = deciding_cycle(network_of(profile))
-    planned = float(plain(cycle.load))
+    planned = float(cycle.load)
     recorded = fullest.load(bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s or can.DATA_BIT_RATE)
     words = (
         f"The plan has a load of {100 * planned:.3g} %, the fullest second of the log {100 * recorded:.3g} %, both "
@@ -228,7 +227,7 @@ def _time_beyond(profile: Profile, machine: Reading) -> ProfileLine | None:
     frames = machine.bus["frames"]
     file_us = sum(map(ethercat.frame_us, frames.value))
     terms = deciding_cycle(network_of(profile)).terms
-    planned_us = sum(float(plain(term.us)) for term in terms if term.key in _FRAMES)
+    planned_us = sum(float(term.us) for term in terms if term.key in _FRAMES)
     subject = "its frame takes" if len(frames.value) == 1 else f"its {len(frames.value)} frames take"
     words = f"{machine.file}: {subject} {file_us:.2f} us on the wire"
     if file_us < planned_us - _ROUNDING_US:

@@ -13,7 +13,7 @@ import numpy as np
 
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
-from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.scale import round_numbers
@@ -394,7 +394,7 @@ def _counts(design: int, most: int) -> tuple[int, ...]:
 
 def design_value(key: str, network: Network) -> Any:
     """The profile's own value along a direction; None if it has none."""
-    return int(plain(network.axes)) if key == AXES else value_at(network.profile, key)
+    return int(network.axes) if key == AXES else value_at(network.profile, key)
 
 
 def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:

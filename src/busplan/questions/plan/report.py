@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
@@ -53,7 +52,7 @@ def plan_report(plan: PlanAnswer) -> Report:
         document(
             "plan",
             profile=plan.profile.name,
-            goal={"nodes": int(plain(plan.goal.nodes)), "axes": int(plain(plan.goal.axes))},
+            goal={"nodes": int(plan.goal.nodes), "axes": int(plan.goal.axes)},
             free=[freedom.name for freedom in plan.free],
             **fields(plan, "period_is_kept", "recommended_changes"),
             binding=None if plan.binding is None else {"constraint": plan.binding.key, "reason": plan.binding.why},
@@ -125,7 +124,7 @@ def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
     goal = plan.goal
     if not goal.groups:
         return (Code(goal.profile.name),)
-    nodes, axes = int(plain(goal.nodes)), int(plain(goal.axes))
+    nodes, axes = int(goal.nodes), int(goal.axes)
     return (
         *(Code(goal.profile.name), " with "),
         *(figure_value(NODES, nodes), f" {nouns(nodes, 'node')} ("),

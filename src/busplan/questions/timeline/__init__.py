@@ -4,7 +4,6 @@ import re
 from typing import Final
 
 from busplan.buses.network import Network
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
@@ -109,7 +108,7 @@ def _transaction(given: object, network: Network) -> tuple[str, int]:
             text = f"{kind}:{node}"
         case _:
             raise BusplanError(f'transaction {given!r}: expected one of one node, as ("read", 1)')
-    kinds, nodes = [kind.key for kind in network.bus.stretch_kinds], int(plain(network.nodes))
+    kinds, nodes = [kind.key for kind in network.bus.stretch_kinds], int(network.nodes)
     if kind in kinds and 1 <= node <= nodes:
         return kind, node
     expected = f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"

@@ -13,7 +13,7 @@ from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.limits import IDLE
 from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
-from busplan.elementwise import Number, existing, plain
+from busplan.elementwise import Number, existing
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import certainty, fits_in
 from busplan.questions.fit.figures import FitFigures, certainty_numbers, figures, margin_us
@@ -97,7 +97,7 @@ class Schedule(NamedTuple):
     @property
     def margin_us(self) -> float:
         """Time that the cycle leaves of its slice [us]."""
-        return plain(margin_us(self.required_us, available_us=self.figures.available_us))
+        return margin_us(self.required_us, available_us=self.figures.available_us)
 
     @property
     def is_whole(self) -> bool:
@@ -157,7 +157,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     >>> abs(cycle.used_us - cycle.figures.required_us) < 1e-9
     True
     """
-    nodes = int(plain(network.nodes))
+    nodes = int(network.nodes)
     if nodes > MOST_NODES:
         limit = network.bus.limit("nodes")
         carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
@@ -178,7 +178,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         tuple(events),
         from_us=0.0,
         to_us=events[-1].end_us,
-        required_us=plain(cycle.required_us),
+        required_us=cycle.required_us,
         **certainty_of(cycle, model),
         number=number,
         cycles=hyperperiod(cycle.rates),
@@ -251,7 +251,7 @@ def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
     """
     total_us = lost_us = start_us = 0.0
     for part in parts:
-        us = plain(part.us)
+        us = part.us
         larger_us, smaller_us = max(total_us, us), min(total_us, us)
         total_us = larger_us + smaller_us
         lost_us += (larger_us - total_us) + smaller_us
@@ -296,8 +296,8 @@ def distinct_cycles(laid_out: Schedule) -> tuple[DistinctCycle, ...] | None:
         DistinctCycle(
             numbers,
             group_names(due := due_groups(laid_out, numbers[0])),
-            sum(int(plain(group.nodes)) for group in due),
-            plain(cycle.at(numbers[0]).required_us),
+            sum(int(group.nodes) for group in due),
+            cycle.at(numbers[0]).required_us,
         )
         for numbers in numbers_by_due(cycle.rates).values()
     )

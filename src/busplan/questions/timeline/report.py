@@ -6,7 +6,6 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
-from busplan.elementwise import plain
 from busplan.english import nouns
 from busplan.forms.blocks import (
     Chart,
@@ -112,8 +111,8 @@ def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
     needs, available_us = [], schedule.figures.available_us
     for model in model_names(schedule.network):
         cycle = cycle_of(schedule.network, model, schedule.number)
-        required_us, corrected_us = plain(cycle.required_us), certainty_of(cycle, model)["margin_corrected_us"]
-        margin = plain(margin_us(required_us, available_us=available_us))
+        required_us, corrected_us = cycle.required_us, certainty_of(cycle, model)["margin_corrected_us"]
+        margin = margin_us(required_us, available_us=available_us)
         needs.append(ModelNeeds(model, required_us, margin, corrected_us))
     return tuple(needs)
 
