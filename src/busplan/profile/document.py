@@ -18,6 +18,7 @@ from busplan.profile.constants import constants_of, is_constant
 from busplan.profile.kinds import holder, kind_of, named_path, profile_model
 from busplan.profile.machine_files import matching
 from busplan.profile.places import KeyPath, Lines, Place, comments, places
+from busplan.sections.base import Section
 from busplan.sections.profile import Profile
 from busplan.sourced import Grade, constants_changed
 
@@ -298,7 +299,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     constants = constants_of(changes, profile.bus.kind, origin)
     changes = {key: value for key, value in changes.items() if not is_constant(key)}
     # Defaults may be constants.
-    kept = {} if constants else _unchanged_tables(profile, changes.keys())
+    kept = {} if constants else _unchanged(profile, changes.keys())
     data = profile.model_dump(exclude_unset=True, exclude=set(kept))
     for key, value in changes.items():
         table, last = holder(data, key, name=origin.get(key))
@@ -316,13 +317,13 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     raise refused_changes(result, data, changes, origin)
 
 
-def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, object]:
-    """Arrays of tables that no change touches. They are valid as they are, and there may be thousands of tables."""
+def _unchanged(profile: Profile, changes: KeysView[str]) -> dict[str, object]:
+    """Sections and arrays of tables that no change touches, but for [bus] with the kind: they are valid as they are."""
     if not changes.isdisjoint(_KINDS):
         return {}
-    changed = {key.partition(".")[0] for key in changes}
+    changed = {key.partition(".")[0] for key in ("bus", *changes)}
     values = {name: getattr(profile, name) for name in profile.model_fields_set - changed}
-    return {name: value for name, value in values.items() if isinstance(value, tuple)}
+    return {name: value for name, value in values.items() if isinstance(value, tuple | Section)}
 
 
 def has_comment_grades(profile: Profile) -> bool:

@@ -185,6 +185,7 @@ def kind_of(data: Mapping[str, object]) -> str | None:
     return kind if isinstance(kind, str) and kind in kind_names() else None
 
 
+@cache
 def profile_model(kind: str | None) -> type[Profile]:
     """Model of the profiles of a kind of bus; for None, the common model of all kinds."""
     return Profile if kind is None else kind_named(kind).profile_model()

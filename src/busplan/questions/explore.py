@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain
 from math import ceil, prod
 from typing import Final
 
@@ -16,21 +16,21 @@ from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
-from busplan.questions.capacity.verdict import Fastest, Verdict, verdict_of
+from busplan.questions.capacity.verdict import Verdict, verdicts_of
 from busplan.questions.fit.grid import capacities
-from busplan.questions.fit.network import PERIOD, changed
+from busplan.questions.fit.network import changed
 from busplan.questions.map import (
     Along,
     Cell,
     Direction,
-    Grid,
     MapAnswer,
     NotDrawn,
     design_value,
     direction,
     directions,
+    in_rows,
     map_of,
-    settings_of,
+    possible_points,
 )
 from busplan.questions.map.report import circle_words, map_document, map_drawing, title_of, value_text
 from busplan.sections.base import TRANSACTION_KINDS, value_at
@@ -172,33 +172,26 @@ def explore(
     maps, cards = [], []
     for number, variant in enumerate(networks):
         part = part_of(progress, number=number, of=len(networks))
-        grid = settings_of(variant, *chosen)
-        judged = _judged(grid, part_of(part, number=0, of=2) if circle else part)
+        points = possible_points(variant, *chosen)
+        possible = [*points.possible.values()]
+        judging = part_of(part, number=0, of=2) if circle else part
+        verdicts = verdicts_of(possible, capacities(variant, possible), progress=judging)
         answer = map_of(
-            grid,
-            {place: verdict.deciding for place, verdict in judged.items()},
+            variant,
+            *chosen,
+            points,
+            [verdict.deciding for verdict in verdicts],
             circle=circle,
             executor=executor,
             progress=part_of(part, number=1, of=2) if circle else ignored,
         )
         maps.append(answer)
-        places = product(range(len(answer.rows)), range(len(answer.rows[0])))
-        cards.append(tuple(_card(answer, judged.get(place), answer.rows[place[0]][place[1]]) for place in places))
+        judged = dict(zip(points.possible, verdicts, strict=True))
+        numbers = range(len(points.possible) + len(points.refused))
+        verdict_rows = in_rows([judged.get(number) for number in numbers], columns=len(answer.x.values))
+        pairs = zip(chain(*verdict_rows), chain(*answer.rows), strict=True)
+        cards.append(tuple(_card(answer, verdict, cell) for verdict, cell in pairs))
     return ExploreAnswer(network.profile, third, tuple(maps), tuple(cards))
-
-
-def _judged(grid: Grid, progress: Progress) -> dict[tuple[int, int], Verdict]:
-    """The verdict of `capacity` at each setting; those that differ in their period alone share the fastest one."""
-    results = capacities(grid.network, [*grid.settings.values()])
-    fastest: dict[object, Fastest] = {}
-    judged = {}
-    for number, ((place, setting), result) in enumerate(zip(grid.settings.items(), results, strict=True)):
-        progress(number, len(results))
-        point = setting.without(PERIOD)
-        verdict = verdict_of(setting.network, result, fastest=fastest.get(point))
-        fastest[point] = verdict.fastest, verdict.best_register
-        judged[place] = verdict
-    return judged
 
 
 def _third(network: Network, over: Along | None, *, with_circle: bool) -> Direction | None:

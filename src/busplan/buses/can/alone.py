@@ -128,8 +128,8 @@ class CanCycle(BusCycle):
         if possible_us := self.possible_us():
             lines.append(("upper bound", f"{self.bound_words} up to {_short(possible_us)} us; they may wait less"))
         tried = range(int(c.MOST_REPEATED) + 1)
-        repeated = bisect_left(tried, 1, key=lambda number: not fits(self._with_burst(number))) - 1
-        if repeated >= 0:
+        if fits(self._with_burst(0)):
+            repeated = bisect_left(tried, 1, lo=1, key=lambda number: not fits(self._with_burst(number))) - 1
             kept = f"up to {repeated} in a row keep the verdict, one more" if repeated else "a single one"
             broken = self._broken_with(repeated + 1) if repeated < c.MOST_REPEATED else " was not tried"
             lines.append((REPEATED, kept + broken))

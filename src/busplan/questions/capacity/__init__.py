@@ -16,10 +16,11 @@ from busplan.questions.base.arguments import (
     require_cycle,
     with_its_constants,
 )
-from busplan.questions.capacity.verdict import Verdict, verdict_of
+from busplan.questions.capacity.verdict import Verdict, verdicts_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
-from busplan.questions.fit.network import at_periods, model_names
+from busplan.questions.fit.grid import GridPoint
+from busplan.questions.fit.network import PERIOD, at_periods, model_names
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ def capacity(
     models = checked_models(timing_model, network) or model_names(network)
     networks = at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us"))
     periods = tuple(tuple(capacity_figures(at, model=model) for model in models) for at in networks)
-    verdicts = tuple(verdict_of(at, figures) for at, figures in zip(networks, periods, strict=True))
+    verdicts = tuple(verdicts_of([GridPoint({PERIOD: at.period_us}, at) for at in networks], periods))
     if not sensitivity:
         return CapacityAnswer(network.profile, periods, verdicts)
     from busplan.questions.capacity.sensitivity import sensitivity_of

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple
 
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import RestsOn
@@ -16,6 +16,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import known_decimals, known_text, period
 from busplan.profile.edit import short_text
+from busplan.progress import Progress, ignored
 from busplan.questions.base.sentences import (
     change_meanings,
     checked_against,
@@ -25,19 +26,19 @@ from busplan.questions.base.sentences import (
     used_us,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
-from busplan.questions.fit.cure import NODES, Changes, SettingForPeriod, best_register, cure
+from busplan.questions.fit.cure import NODES, Changes, Cure, SettingForPeriod, Variant, Variants, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
     GroupCapacity,
-    after_reset,
     capacity_figures,
-    figures,
+    reset,
     words_behind,
 )
-from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
-from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits, smallest_period
-from busplan.questions.fit.network import changed, not_applicable
+from busplan.questions.fit.graded import HeavyAssumption
+from busplan.questions.fit.grid import GridPoint, fits_at
+from busplan.questions.fit.needs import MissedLimit, SmallestPeriod, missed_limits
+from busplan.questions.fit.network import PERIOD, changed, not_applicable
 from busplan.sections.base import MAX_COUNT
 
 
@@ -117,79 +118,123 @@ class Verdict(Judged):
     """The same without the lines that are alike for every period."""
 
 
-Fastest: TypeAlias = tuple[SmallestPeriod | None, SettingForPeriod | None]
-"""`fastest` and `best_register` of a verdict."""
+class _Judged(NamedTuple):
+    """What is known of a network before the figures of what it could become."""
+
+    deciding: CapacityFigures
+    variants: Variants
+    missed: tuple[MissedLimit, ...]
+    mending: Cure
+    """The change that mends what is wrong, or that makes room for one more node on a full bus."""
+    mended: Network | None
+    """The network after that change; None without one."""
+    reset: Network | None
+    """The network after a bus reset; None where that does not matter."""
 
 
-def verdict_of(network: Network, results: tuple[CapacityFigures, ...], *, fastest: Fastest | None = None) -> Verdict:
-    """Judge a network at its period.
+def verdicts_of(
+    points: Sequence[GridPoint], results: Sequence[tuple[CapacityFigures, ...]], *, progress: Progress = ignored
+) -> list[Verdict]:
+    """Judge networks at their periods; those that differ in their period alone share what it has no part in.
 
     Parameters
     ----------
-    network
-        The network.
+    points
+        The networks.
     results
-        Its figures under the timing models that were asked for.
-    fastest
-        Those of the same network at another period, if they are known: they are the same.
+        Figures of each under the timing models that were asked for.
+    progress
+        Called now and then with the networks that are judged, and all of them.
     """
-    bus = network.bus
-    model = bus.deciding_model
+    variants: dict[object, Variants] = {}
+    judged = []
+    for number, (point, figures) in enumerate(zip(points, results, strict=True)):
+        progress(number, len(points))
+        shared = variants.setdefault(point.without(PERIOD), Variants(point.network))
+        judged.append(_judged(point.network, figures, shared))
+    mended = _fits_after(points, [(one.mending.changes or {}, one.mended) for one in judged])
+    resets = _fits_after(points, [(points[0].network.bus.safety.after_reset, one.reset) for one in judged])
+    rows = zip(results, judged, mended, resets, strict=True)
+    return [_verdict(point.network, *row) for point, row in zip(points, rows, strict=True)]
+
+
+def _fits_after(
+    points: Sequence[GridPoint], changed: Sequence[tuple[Changes, Network | None]]
+) -> list[FitFigures | None]:
+    """Figures of networks after changes, under the model that decides; None where there is no such network."""
+    after = {
+        place: GridPoint(point.changes | dict(changes), network)
+        for place, (point, (changes, network)) in enumerate(zip(points, changed, strict=True))
+        if network is not None
+    }
+    fits = fits_at([*after.values()], model=points[0].network.bus.deciding_model)
+    found = dict(zip(after, fits, strict=True))
+    return [found.get(place) for place in range(len(points))]
+
+
+def _judged(network: Network, results: tuple[CapacityFigures, ...], variants: Variants) -> _Judged:
+    model = network.bus.deciding_model
     deciding = next((result for result in results if result.timing_model == model), None) or capacity_figures(
         network, model=model
     )
-    cycle, period_us = bus.cycle(network, model=model), deciding.period_us
     missed = missed_limits(network)
-    change, no_change = _change(network, deciding, is_missed=bool(missed))
-    least, best = fastest or _fastest_of(network)
+    mending, mended = _change(Variant(network, variants), deciding, is_missed=bool(missed))
+    return _Judged(deciding, variants, missed, mending, mended, reset(network, deciding))
+
+
+def _verdict(
+    network: Network,
+    results: tuple[CapacityFigures, ...],
+    known: _Judged,
+    mended: FitFigures | None,
+    after_reset: FitFigures | None,
+) -> Verdict:
+    bus, deciding, variants, mending = network.bus, known.deciding, known.variants, known.mending
+    cycle = bus.cycle(network, model=bus.deciding_model)
     judged = Judged(
         setup=bus.setup_words(network),
         counted=bus.counted(network),
-        period_us=period_us,
+        period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
         broken_limits=words_behind(deciding, network),
-        missed_limits=missed,
-        fastest=least,
-        best_register=best,
-        after_reset=after_reset(network, deciding),
-        assumptions=heavy_assumptions(deciding, network),
+        missed_limits=known.missed,
+        fastest=variants.fastest if network.groups else None,
+        best_register=variants.best_register if network.groups else None,
+        after_reset=None if after_reset is None or after_reset.verdict == FITS else after_reset,
+        assumptions=variants.assumptions(deciding),
         rests_on=cycle.rests_on(),
         not_applicable=not_applicable(network),
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
-        change=change,
-        no_change=no_change,
+        change=None if mended is None else Change(mending.changes or {}, mended.nodes, mended),
+        no_change=mending.why,
     )
     card, brief_card = _cards(judged, network, bus_lines=cycle.card_lines(is_shown_to_fit))
     return Verdict(**vars(judged), card=card, brief_card=brief_card)
 
 
-def _fastest_of(network: Network) -> Fastest:
-    """The shortest period of a network as it is set, and the setting of a register that makes it the shortest."""
-    if not network.groups:
-        return None, None
-    least = smallest_period(network, is_safe=False, with_limits=False)
-    return least, best_register(network, least)
+def _change(target: Variant, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, Network | None]:
+    """The change that mends what is wrong or makes room on a full bus for one more node, and the network after it."""
+    if now.verdict == FITS and now.safe and not is_missed:
+        if now.safe_nodes is None or now.safe_nodes > now.nodes:
+            return Cure(None), None  # there is room, or nobody said which of the groups is to grow
+        if now.safe_nodes == MAX_COUNT:
+            return Cure(None, f"{MAX_COUNT} nodes are the most that a profile can have"), None
+        one_more = target.after(more := {NODES: now.safe_nodes + 1})
+        if one_more is None:
+            return Cure(None, _refusal(target.network, more)), None
+        target = one_more
+    mending = cure(*target)
+    after = None if mending.changes is None else target.after(mending.changes)
+    return mending, after and after.network
 
 
-def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple[Change | None, str]:
-    """The change that mends what is wrong or makes room on a full bus for one more node, or why there is none."""
-    if now.verdict != FITS or not now.safe or is_missed:
-        target = network
-    elif now.safe_nodes is None or now.safe_nodes > now.nodes:
-        return None, ""  # there is room, or nobody said which of the groups is to grow
-    elif now.safe_nodes == MAX_COUNT:
-        return None, f"{MAX_COUNT} nodes are the most that a profile can have"
-    else:
-        try:
-            target = changed(network, {NODES: now.safe_nodes + 1})
-        except BusplanError as error:
-            return None, str(error)
-    mending = cure(target)
-    if mending.changes is None:
-        return None, mending.why
-    after = figures(changed(target, mending.changes), model=now.timing_model)
-    return Change(mending.changes, int(target.nodes), after), ""
+def _refusal(network: Network, changes: Changes) -> str:
+    try:
+        changed(network, changes)
+    except BusplanError as error:
+        return str(error)
+    return ""
 
 
 _CARD_WORDS: Final = 62

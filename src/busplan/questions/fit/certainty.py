@@ -109,9 +109,9 @@ def verdict_code(codes: Mapping[str, Number]) -> Number:
 
 def is_shown_to_fit(network: Network) -> bool:
     """Whether the verdict on a network of plain numbers is that it fits, by the timing model that decides."""
-    cycle = network.bus.cycle(network, model=network.bus.deciding_model)
-    codes = {**limit_codes(network), TIME: time_code(certainty(cycle), network)}
-    return VERDICTS[int(verdict_code(codes))] == FITS
+    cycle, limits = deciding_cycle(network), (limit for limit in network.bus.limits if limit.role != "safety")
+    is_in_time = time_code(certainty(cycle), network) == KEPT
+    return bool(is_in_time) and not any(limit.shown.is_broken(network) for limit in limits)
 
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Held, ...]:

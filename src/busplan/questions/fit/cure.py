@@ -3,18 +3,22 @@
 from bisect import bisect_left
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import ROUND_CEILING, Context, Decimal
+from functools import cached_property
 from itertools import product
 from math import ceil, inf
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
 from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
+from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.needs import (
     Need,
     SmallestPeriod,
     most_asking,
+    needs_of,
     rooms,
     smallest_period,
     to_be_shown,
@@ -52,6 +56,85 @@ _WORTHWHILE: Final = 0.99
 """Share of the smallest period from which on a shorter one is not worth a word."""
 
 
+class Variants:
+    """What a network needs, as it is and after changes: found once for networks that differ in their period alone."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        """The network; its own period plays no part."""
+        self._after: dict[frozenset[tuple[str, Value]], Variants | None] = {}
+        self._assumptions: tuple[HeavyAssumption, ...] | None = None
+
+    def after(self, changes: Changes) -> "Variants | None":
+        """The variants of the network after changes; None where its schema refuses them."""
+        new = {key: value for key, value in changes.items() if key != PERIOD}
+        if not new:
+            return self
+        known = frozenset(new.items())
+        if known not in self._after:
+            try:
+                self._after[known] = Variants(changed(self.network, new))
+            except BusplanError:
+                self._after[known] = None
+        return self._after[known]
+
+    def assumptions(self, figures: FitFigures) -> tuple[HeavyAssumption, ...]:
+        """Assumptions with a large share of the required time or of its variance, from the figures at any period."""
+        if self._assumptions is None:
+            self._assumptions = heavy_assumptions(figures, self.network)
+        return self._assumptions
+
+    @cached_property
+    def needs(self) -> tuple[Need, ...]:
+        """All that a plan asks of the period."""
+        return needs_of(self.network)
+
+    @cached_property
+    def smallest(self) -> SmallestPeriod:
+        """The smallest period at which every constraint of a plan holds."""
+        return smallest_period(self.network)
+
+    @cached_property
+    def fastest(self) -> SmallestPeriod:
+        """The smallest period at which the network is shown to fit."""
+        return smallest_period(self.network, is_safe=False, with_limits=False)
+
+    @cached_property
+    def best_register(self) -> SettingForPeriod | None:
+        """The setting of a register that makes the smallest period the shortest; None if none is worthwhile."""
+        return best_register(self.network, self.fastest)
+
+
+class Variant(NamedTuple):
+    """A network at its period, and what it shares with itself at other periods."""
+
+    network: Network
+    variants: Variants
+
+    @classmethod
+    def of(cls, network: Network, variants: Variants | None = None) -> Self:
+        """A network, with what is known of it at other periods."""
+        return cls(network, variants or Variants(network))
+
+    def after(self, changes: Changes) -> Self | None:
+        """The network after changes; None where its schema refuses them."""
+        after = self.variants.after(changes)
+        if after is None:
+            return None
+        if after is self.variants and PERIOD not in changes:
+            return self
+        return type(self)(at_period(after.network, float(changes.get(PERIOD, self.network.period_us))), after)
+
+    def unmet(self) -> list[Need]:
+        """Needs that it does not meet at its period."""
+        return unmet(self.network, self.variants.needs)
+
+    def holds(self, changes: Changes | None) -> bool:
+        """Whether every constraint of a plan holds after changes."""
+        after = self.after(changes) if changes else None
+        return after is not None and not after.unmet()
+
+
 def best_register(network: Network, now: SmallestPeriod) -> SettingForPeriod | None:
     """Find the setting of a register with which the smallest period is the shortest; None if none is worthwhile.
 
@@ -62,12 +145,13 @@ def best_register(network: Network, now: SmallestPeriod) -> SettingForPeriod | N
     now
         Its smallest period as it is set.
     """
+    variants = Variants(network)
     settings = [setting for setting in network.bus.settings(network) if setting.cost == Cost.REGISTER]
-    trials = [(values, _with_one(network, values)) for setting in settings for values in setting.values]
+    trials = [(values, variants.after(values)) for setting in settings for values in setting.values]
     found = [
         SettingForPeriod(values, least.us)
         for values, trial in trials
-        if trial is not None and (least := smallest_period(trial, with_limits=False)).us is not None
+        if trial is not None and (least := smallest_period(trial.network, with_limits=False)).us is not None
     ]
     best = min(found, key=lambda trial: trial.period_us, default=None)
     return best if best and best.period_us < _WORTHWHILE * (now.us or inf) else None
@@ -155,7 +239,9 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     return tuple(freedom for freedom in still if any(map(freedom.is_meant, names)))
 
 
-def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[PlanStep]:
+def search(
+    network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = (), variants: Variants | None = None
+) -> list[PlanStep]:
     """Change one thing at a time, the cheapest first, until every constraint of a plan holds.
 
     Of each thing the least change that is enough is taken; where none is, the one that comes nearest, and the next
@@ -169,40 +255,45 @@ def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str]
         Freedoms, the cheapest first.
     kept
         Keys that must stay.
+    variants
+        Those of the same network at another period, if they are known.
 
     Returns
     -------
     list
         The steps from the network as it is; the last one holds, or nothing of the levels is enough.
     """
-    steps = [PlanStep(None, {}, tuple(unmet(network)))]
+    now = start = Variant.of(network, variants)
+    steps = [PlanStep(None, {}, tuple(start.unmet()))]
     changes: list[Changes] = []
     for freedom in levels:
-        if not steps[-1].unmet:
+        needs = list(steps[-1].unmet)
+        if not needs:
             break
-        now = _with(network, changes)
-        nearest, needs = None, list(steps[-1].unmet)
+        nearest, reached = None, now
         for change in _values(freedom, now, kept):
-            if set(change) & set(kept) or (after := _with_one(now, change)) is None:
+            if set(change) & set(kept) or (after := now.after(change)) is None:
                 continue
-            still = unmet(after)
-            if not still or _lack(still, after) < _lack(needs, now if nearest is None else _with_one(now, nearest)):
-                nearest, needs = change, still
+            still = after.unmet()
+            if not still or _lack(still, after.network) < _lack(needs, reached.network):
+                nearest, needs, reached = change, still, after
             if not still:
                 break
-        changes += [nearest] if nearest else []
+        if nearest:
+            changes.append(nearest)
+            now = _with(start, changes)
         steps.append(PlanStep(freedom, _together(changes), tuple(needs)))
     if not steps[-1].unmet and len(changes) > 1:
-        steps[-1] = steps[-1]._replace(changes=_together(_needed(network, changes)))
+        steps[-1] = steps[-1]._replace(changes=_together(_needed(start, changes)))
     return steps
 
 
-def _needed(network: Network, changes: list[Changes]) -> list[Changes]:
+def _needed(start: Variant, changes: list[Changes]) -> list[Changes]:
     """The changes without those that are not needed beside the last, the dearest first."""
     left = list(changes)
     for change in changes[-2::-1]:
         fewer = [kept for kept in left if kept is not change]
-        if not unmet(_with(network, fewer)):
+        if not _with(start, fewer).unmet():
             left = fewer
     return left
 
@@ -211,76 +302,65 @@ def _together(changes: Sequence[Changes]) -> Changes:
     return {key: value for change in reversed(changes) for key, value in change.items()}
 
 
-def _with(network: Network, changes: Sequence[Changes]) -> Network:
-    return changed(network, _together(changes)) if changes else network
+def _with(start: Variant, changes: Sequence[Changes]) -> Variant:
+    """The network after changes of which each was possible beside those before it."""
+    after = start.after(_together(changes))
+    if after is None:
+        raise RuntimeError(f"{_together(changes)}: refused together, and not one by one")
+    return after
 
 
-def _with_one(network: Network, change: Changes) -> Network | None:
-    """The network after a change; None where its schema refuses it."""
-    if list(change) == [PERIOD]:
-        return at_period(network, float(change[PERIOD]))
-    try:
-        return changed(network, change)
-    except BusplanError:
-        return None
-
-
-def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
+def _lack(needs: Sequence[Need], network: Network) -> tuple[int, float]:
     """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
-    if not needs or network is None:
-        return 0, 0.0
     periods_us = [need.period_us(float(network.slice_ratio)) for need in needs]
     return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
 
 
-def _values(freedom: Freedom, network: Network, kept: Collection[str]) -> Iterator[Changes]:
+def _values(freedom: Freedom, now: Variant, kept: Collection[str]) -> Iterator[Changes]:
     """Values of a network, the least change first, beside keys that must stay.
 
     Where none is enough, what helps most is among them.
     """
     match freedom.name:
         case "slice_ratio":
-            return _ratios(network)
+            return _ratios(now)
         case "payload":
-            return _payloads(network, kept)
+            return _payloads(now, kept)
         case "period":
-            return _periods(network)
+            return _periods(now)
         case "nodes":
-            return _fewer_nodes(network)
+            return _fewer_nodes(now)
     # A setting of the bus is safe for all nodes that [limits] asks for.
+    network = now.network
     largest = max((network, *(room.network for room in rooms(network))), key=lambda room: float(room.nodes))
     settings = (setting for setting in network.bus.settings(largest) if setting.name == freedom.name)
     return (values for setting in settings for values in setting.values)
 
 
-def _ratios(network: Network) -> Iterator[Changes]:
+def _ratios(now: Variant) -> Iterator[Changes]:
     """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
-    own, period_us = float(network.slice_ratio), float(network.period_us)
-    slice_us = max((need.slice_us for need in unmet(network) if need.slice_us < inf), default=0.0)
+    own, period_us = float(now.network.slice_ratio), float(now.network.period_us)
+    slice_us = max((need.slice_us for need in now.unmet() if need.slice_us < inf), default=0.0)
     ratio = min(ceil(_RATIO_STEPS * slice_us / period_us * (1 - FIT_ROUNDING)) / _RATIO_STEPS, MOST_RATIO)
     if ratio > own:
         yield {RATIO: ratio}
 
 
-def _payloads(network: Network, kept: Collection[str]) -> Iterator[Changes]:
+def _payloads(now: Variant, kept: Collection[str]) -> Iterator[Changes]:
     """The largest payload with which all constraints hold, or the smallest one: the larger of read and write is cut."""
-    profile, payloads = network.profile, network.bus.payloads(network)
+    network, profile = now.network, now.network.profile
+    payloads = network.bus.payloads(network)
     cuts = [_cut(group, kind) for group, kind in product(profile.node_groups, TRANSACTION_KINDS)]
     step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
     most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
     sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
     # No more bytes are needed where fewer are not enough, but where a table of execution times falls.
-    fits = bisect_left(sizes, x=True, key=lambda size: not _holds(network, _within(profile, size, kept)))
+    fits = bisect_left(sizes, x=True, key=lambda size: not now.holds(_within(profile, size, kept)))
     yield from (
         (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _within(profile, size, kept)))
         if sizes
         else ()
     )
-
-
-def _holds(network: Network, change: Changes | None) -> bool:
-    after = _with_one(network, change) if change else None
-    return after is not None and not unmet(after)
 
 
 def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
@@ -302,17 +382,17 @@ def _cut(group: ProfileGroup, kind: TransactionKind) -> tuple[str, int]:
     return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
 
 
-def _periods(network: Network) -> Iterator[Changes]:
+def _periods(now: Variant) -> Iterator[Changes]:
     """The period nearest to the own one at which all constraints hold: rounded up, or the next that the bus allows."""
-    least = smallest_period(network)
-    if least.us is None:
+    least_us = now.variants.smallest.us
+    if least_us is None:
         return
-    periods, own_us = network.bus.periods, float(network.period_us)
+    periods, own_us = now.network.bus.periods, float(now.network.period_us)
     if periods.us:
-        allowed = (us for us in periods.us if us >= least.us)
+        allowed = (us for us in periods.us if us >= least_us)
         yield from ({PERIOD: us} for us in sorted(allowed, key=lambda us: abs(us - own_us)))
     else:
-        yield {PERIOD: min(rounded_up(max(least.us, own_us)), MAX_TIME_US)}
+        yield {PERIOD: min(rounded_up(max(least_us, own_us)), MAX_TIME_US)}
 
 
 def rounded_up(us: float) -> float:
@@ -327,10 +407,10 @@ def rounded_up(us: float) -> float:
     return float(context.create_decimal(Decimal(us * (1 - FIT_ROUNDING))))
 
 
-def _fewer_nodes(network: Network) -> Iterator[Changes]:
+def _fewer_nodes(now: Variant) -> Iterator[Changes]:
     """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
-    counts = range(int(network.nodes) - 1, 0, -1)
-    place = bisect_left(counts, x=True, key=lambda nodes: _holds(network, {NODES: nodes}))
+    counts = range(int(now.network.nodes) - 1, 0, -1)
+    place = bisect_left(counts, x=True, key=lambda nodes: now.holds({NODES: nodes}))
     if counts:
         yield {NODES: counts[min(place, len(counts) - 1)]}
 
@@ -344,19 +424,27 @@ class Cure(NamedTuple):
     """Reason that no change is enough."""
 
 
-def cure(network: Network) -> Cure:
-    """Find the change that mends a network, with the default freedoms of a plan."""
-    steps = search(network, freed(network))
+def cure(network: Network, variants: Variants | None = None) -> Cure:
+    """Find the change that mends a network, with the default freedoms of a plan.
+
+    Parameters
+    ----------
+    network
+        The network.
+    variants
+        Those of the same network at another period, if they are known.
+    """
+    steps = search(network, freed(network), variants=variants)
     last = steps[-1]
     return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
 
 
 def stands_in_the_way(network: Network, step: PlanStep) -> Need:
     """The constraint that a step does not hold, with its words."""
-    after = changed(network, step.changes)
-    ratio = float(after.slice_ratio)
+    ratio = float(step.changes.get(RATIO, network.slice_ratio))
+    period_us = float(step.changes.get(PERIOD, network.period_us))
     need = most_asking(step.unmet, ratio=ratio)
-    return need._replace(why=need.words(ratio=ratio, most_us=float(after.period_us)))
+    return need._replace(why=need.words(ratio=ratio, most_us=period_us))
 
 
 def changeable(network: Network) -> tuple[str, ...]:
@@ -388,12 +476,13 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
 
 def settings_to_be_carried(network: Network) -> Changes:
     """The cheapest setting of the bus with which some slice carries the network, where none does now; else empty."""
+    variants = Variants(network)
 
-    def is_carried(trial: Network | None) -> bool:
-        return trial is not None and all(need.period_us(1.0) < inf for need in to_be_shown(trial))
+    def is_carried(trial: Variants | None) -> bool:
+        return trial is not None and all(need.period_us(1.0) < inf for need in to_be_shown(trial.network))
 
-    if is_carried(network):
+    if is_carried(variants):
         return {}
     settings = sorted(network.bus.settings(network), key=lambda setting: setting.cost)
     changes = (dict(values) for setting in settings for values in setting.values)
-    return next((change for change in changes if is_carried(_with_one(network, change))), {})
+    return next((change for change in changes if is_carried(variants.after(change))), {})

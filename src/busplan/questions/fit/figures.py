@@ -1,9 +1,9 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
+from itertools import count, repeat
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
@@ -30,7 +30,7 @@ from busplan.questions.fit.certainty import (
     verdict_code,
 )
 from busplan.questions.fit.network import trial
-from busplan.sections.base import MAX_COUNT
+from busplan.sections.base import MAX_COUNT, value_at
 from busplan.sections.machine import ProfileGroup
 
 if TYPE_CHECKING:
@@ -120,6 +120,17 @@ def most_nodes(
     ceiling
         No answer is larger [1].
     """
+    found = _most_nodes(with_nodes, limits, ceiling=min(ceiling, _PLAUSIBLE))
+    if ceiling <= _PLAUSIBLE or is_everywhere(found.nodes < _PLAUSIBLE):
+        return found
+    return _most_nodes(with_nodes, limits, ceiling=ceiling)
+
+
+_PLAUSIBLE: Final = 128
+"""More nodes are tried only where so many keep every limit: a cycle of a million takes long to count."""
+
+
+def _most_nodes(with_nodes: Callable[[Number], Network], limits: Sequence[Held], *, ceiling: int) -> MostNodes:
     nodes: Number = ceiling
     most: dict[int, Number] = {}
     order = sorted(range(len(limits)), key=lambda index: limits[index].is_slow)
@@ -370,42 +381,110 @@ def _with_nodes_of_one(network: Network, places: "NDArray[np.int_]", nodes: Numb
     return network._replace(groups=tuple(groups))
 
 
+class FitNumbers(NamedTuple):
+    """The figures of a network under one timing model, computed elementwise: the numbers may be arrays."""
+
+    kind: str
+    """The kind of bus."""
+    bus_figures: BusFigures
+    """Figures of the kind of bus."""
+    safety: Safety
+    """Setting of the bus that is safe or not."""
+    model: str
+    numbers: Mapping[str, Number | None]
+    """Figures that every kind of bus has, by key; None for one that the timing model does not have."""
+    own: Mapping[str, Number | None]
+    """Figures and terms that only this kind of bus has, by key."""
+    terms: tuple[Term, ...]
+    doubts: tuple[Doubt, ...]
+    codes: Mapping[str, Number]
+    """Verdict on each limit by key, as an index of `VERDICTS`; on time, too, under the model that decides."""
+    broken: Mapping[str, Number]
+    """Where each limit is broken, by key; time at nominal values is the last."""
+    unsafe: Number
+    """Where a safety limit is broken."""
+
+    @property
+    def decides(self) -> bool:
+        """Whether its timing model gives the verdict."""
+        return TIME in self.codes
+
+    def at_points(self, points: int) -> Iterator["FitNumbers"]:
+        """The plain numbers at each point of arrays of shape (points,)."""
+        import numpy as np
+
+        def rows(numbers: Iterable[Number | None]) -> Iterator[tuple[Any, ...]]:
+            columns = (repeat(None) if one is None else np.broadcast_to(one, points).tolist() for one in numbers)
+            return (tuple(row) for _, *row in zip(range(points), *columns, strict=False))
+
+        parts = (self.numbers, self.own, self.codes, self.broken)
+        terms, doubts = (rows(part.us for part in parts) for parts in (self.terms, self.doubts))
+        for *values, terms_us, doubts_us, (unsafe,) in zip(
+            *(rows(part.values()) for part in parts), terms, doubts, rows([self.unsafe]), strict=True
+        ):
+            numbers, own, codes, broken = (
+                dict(zip(part, row, strict=True)) for part, row in zip(parts, values, strict=True)
+            )
+            yield FitNumbers(
+                self.kind,
+                self.bus_figures,
+                self.safety,
+                self.model,
+                numbers,
+                own,
+                tuple(term._replace(us=us) for term, us in zip(self.terms, terms_us, strict=True)),
+                tuple(doubt._replace(us=us) for doubt, us in zip(self.doubts, doubts_us, strict=True)),
+                codes,
+                broken,
+                unsafe,
+            )
+
+    def figures(self) -> FitFigures:
+        """The figures, of plain numbers."""
+        exceeded = tuple(key for key, is_broken in self.broken.items() if is_broken)
+        not_shown = tuple(key for key, code in self.codes.items() if code == NOT_SHOWN_KEPT)
+        numbers = _plain_or_none(self.numbers)
+        return FitFigures(
+            kind=self.kind,
+            bus_figures=self.bus_figures,
+            safety=self.safety,
+            timing_model=self.model,
+            **numbers | {key: int(numbers[key]) for key in ("nodes", "axes")},
+            not_shown=not_shown if self.decides else None,
+            verdict=VERDICTS[int(verdict_code(self.codes))] if self.decides else None,
+            doubts=self.doubts,
+            terms=self.terms,
+            binding_term=max(self.terms, key=lambda term: term.us).name if self.terms else None,
+            exceeded=exceeded,
+            fits=not exceeded,
+            safe=not self.unsafe,
+            own=_plain_or_none(self.own),
+        )
+
+
 def figures(network: Network, *, model: str) -> FitFigures:
     """Whether a network fits its own period under one timing model."""
-    bus, has_cycle = network.bus, bool(network.groups)
-    cycle = bus.cycle(network, model=model)
-    terms = cycle.terms if has_cycle else ()
+    return fit_numbers(network, model=model).figures()
+
+
+def fit_numbers(network: Network, *, model: str) -> FitNumbers:
+    """The figures of a network under one timing model, computed elementwise."""
+    bus, cycle, has_cycle = network.bus, network.bus.cycle(network, model=model), bool(network.groups)
     numbers: dict[str, Number | None] = {**numeric_figures(cycle)}
-    is_too_long = has_cycle and not fits_in(cycle.required_us, available_us=available_us(network))
-    codes = limit_codes(network)
-    exceeded = tuple(key for key, code in codes.items() if code == BROKEN) + ((TIME,) if is_too_long else ())
-    decided: dict[str, Any] = {"not_shown": None, "verdict": None, "doubts": ()}
+    terms, codes = cycle.terms if has_cycle else (), limit_codes(network)
+    doubts: tuple[Doubt, ...] = ()
+    late = fits_in(cycle.required_us, available_us=available_us(network)) == 0 if has_cycle else False
+    broken = {**{key: code == BROKEN for key, code in codes.items()}, TIME: late}
     if model == bus.deciding_model:
         certain = certainty(cycle)
-        codes[TIME] = time_code(certain, network)
+        codes[TIME], doubts = time_code(certain, network), certain.doubts
         numbers |= certainty_numbers(certain, cycle)
-        decided = {
-            "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
-            "verdict": VERDICTS[int(verdict_code(codes))],
-            "doubts": certain.doubts,
-        }
     else:
         numbers |= dict.fromkeys(_CERTAINTY_KEYS)
     own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
-    return FitFigures(
-        kind=bus.kind,
-        bus_figures=bus.figures,
-        safety=bus.safety,
-        timing_model=model,
-        **_plain_or_none(numbers),
-        **decided,
-        terms=terms,
-        binding_term=max(terms, key=lambda term: term.us).name if terms else None,
-        exceeded=exceeded,
-        fits=not exceeded,
-        safe=bus.is_safe(network),
-        own=_plain_or_none(own | {term.key: term.us for term in terms}),
-    )
+    own |= {term.key: term.us for term in terms}
+    unsafe = total(limit.is_broken(network) for limit in bus.limits if limit.role == "safety") > 0
+    return FitNumbers(bus.kind, bus.figures, bus.safety, model, numbers, own, terms, doubts, codes, broken, unsafe)
 
 
 def _plain_or_none(numbers: Mapping[str, Number | None]) -> dict[str, Any]:
@@ -520,21 +599,24 @@ def words_behind(figures: FitFigures, network: Network) -> tuple[str, ...]:
     return tuple(limit.words(network) for limit in limits_behind(figures, network))
 
 
-def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:
-    """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset.
+def reset(network: Network, now: FitFigures) -> Network | None:
+    """The network after a bus reset; None where it is not shown to fit now, or where a reset changes nothing.
 
     Parameters
     ----------
     network
         The network.
-    deciding
+    now
         Its figures under the model that decides.
     """
     changes = network.bus.safety.after_reset
-    if deciding.verdict != FITS or not changes:
+    if now.verdict != FITS or all(value_at(network.profile, key) == value for key, value in changes.items()):
         return None
-    reset = trial(network, changes)
-    if reset.profile == network.profile:
-        return None
-    after = figures(reset, model=deciding.timing_model)
-    return None if after.verdict == FITS else after
+    return trial(network, changes)
+
+
+def after_reset(network: Network, now: FitFigures) -> FitFigures | None:
+    """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset."""
+    network_then = reset(network, now)
+    then = None if network_then is None else figures(network_then, model=now.timing_model)
+    return None if then is None or then.verdict == FITS else then

@@ -1,19 +1,18 @@
-"""Figures over a grid: the settings of some keys that a profile can have, and the capacity at each of them."""
+"""A grid: values of some keys, the networks at its points, and their figures, in arrays where a kind has them."""
 
-from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple, TypeAlias
+from collections.abc import Iterator, Sequence
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
-import numpy as np
-
-from busplan.buses.limits import Value
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import (
     CapacityFigures,
-    Counts,
+    FitFigures,
     GroupCapacity,
     counts_at,
-    figures,
+    fit_numbers,
     has_arrays,
     most_and_safe_nodes,
     with_counts,
@@ -22,14 +21,77 @@ from busplan.questions.fit.network import changed, model_names, trial
 from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import varied_nodes
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Array: TypeAlias = "NDArray[Any]"
+"""Numbers, truth values, or objects if there are words among them."""
 AXES: Final = "axes"
 """Key of a direction along the number of motion axes. It is no key of a profile: it sets the number of nodes."""
 
 _Changes: TypeAlias = tuple[tuple[str, object], ...]
 
 
-class Setting(NamedTuple):
-    """One combination of values that a profile can have."""
+class Chunk(NamedTuple):
+    """A contiguous part of a grid."""
+
+    shape: tuple[int, ...]
+    """Points along each axis of the grid."""
+    values: dict[str, Array]
+    """Values of each key, shaped to broadcast along its own axis."""
+
+
+class Grid(NamedTuple):
+    """Every combination of the values of some keys; the last key changes fastest."""
+
+    axes: dict[str, Array]
+    """Values by key, each of shape (values,): whole numbers, floats, or objects if there are words among them."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values of each key."""
+        return tuple(axis.size for axis in self.axes.values())
+
+    @property
+    def points(self) -> int:
+        """How many points."""
+        return prod(self.shape)
+
+    def each_point(self) -> Iterator[dict[str, object]]:
+        """Values of the keys of each point."""
+        points = product(*(axis.tolist() for axis in self.axes.values()))
+        return (dict(zip(self.axes, point, strict=True)) for point in points)
+
+    def chunks(self, most: int) -> Iterator[Chunk]:
+        """Split the grid.
+
+        Parameters
+        ----------
+        most
+            Largest number of points of a chunk.
+
+        Yields
+        ------
+        Chunk
+            In row-major order.
+        """
+        import numpy as np
+
+        # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
+        cut = next(number for number in range(len(self.shape) + 1) if prod(self.shape[number + 1 :]) <= most)
+        width = max(1, most // prod(self.shape[cut + 1 :]))
+        parts = [
+            *([slice(index, index + 1) for index in range(size)] for size in self.shape[:cut]),
+            *([slice(begin, begin + width) for begin in range(0, size, width)] for size in self.shape[cut : cut + 1]),
+            *([slice(size)] for size in self.shape[cut + 1 :]),
+        ]
+        for part in product(*parts):
+            values = [axis[places] for axis, places in zip(self.axes.values(), part, strict=True)]
+            yield Chunk(tuple(map(len, values)), dict(zip(self.axes, np.ix_(*values), strict=True)))
+
+
+class GridPoint(NamedTuple):
+    """A point of a grid that a profile can have."""
 
     changes: dict[str, object]
     """New values by key of the profile."""
@@ -37,24 +99,38 @@ class Setting(NamedTuple):
     """The network with them."""
 
     def without(self, key: str) -> _Changes:
-        """Its changes but for one key: settings that share them share what does not depend on the key."""
+        """Its changes but for one key: points that share them share what does not depend on the key."""
         return tuple(change for change in self.changes.items() if change[0] != key)
 
 
-def setting_at(network: Network, values: Mapping[str, Value]) -> Setting | str:
-    """The network with a value of each direction, or why there is none."""
-    changes: dict[str, object] = {key: value for key, value in values.items() if key != AXES}
-    try:
-        if AXES in values:
-            # The other value may change how many nodes it takes for these axes.
-            nodes_key = varied_nodes(network.profile).nodes_key
-            changes[nodes_key] = _nodes_with(values[AXES], changed(network, changes), nodes_key=nodes_key)
-        return Setting(changes, changed(network, changes))
-    except BusplanError as error:
-        return error.problems[0]
+class GridPoints(NamedTuple):
+    """The points of a grid by their number, the last key changing fastest."""
+
+    possible: dict[int, GridPoint]
+    refused: dict[int, str]
+    """Reason why a profile cannot have the point."""
 
 
-def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
+def points_of(network: Network, grid: Grid) -> GridPoints:
+    """The network at each point of a grid; `AXES` may be one of its keys."""
+    points = GridPoints({}, {})
+    # The other values may change how many nodes it takes for the axes.
+    others: dict[_Changes, Network] = {}
+    for number, values in enumerate(grid.each_point()):
+        changes: dict[str, object] = {key: value for key, value in values.items() if key != AXES}
+        try:
+            if AXES in values:
+                if (known := tuple(changes.items())) not in others:
+                    others[known] = changed(network, changes)
+                nodes_key = varied_nodes(network.profile).nodes_key
+                changes[nodes_key] = _nodes_with(values[AXES], others[known], nodes_key=nodes_key)
+            points.possible[number] = GridPoint(changes, changed(network, changes))
+        except BusplanError as error:
+            points.refused[number] = error.problems[0]
+    return points
+
+
+def _nodes_with(axes: object, network: Network, *, nodes_key: str) -> int:
     """Number of varied nodes with which the whole network has so many axes [1].
 
     Raises
@@ -72,53 +148,67 @@ def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     return varied_axes // node_axes
 
 
-def capacities(network: Network, settings: Sequence[Setting]) -> list[tuple[CapacityFigures, ...]]:
-    """Capacity at each setting of a network, under every timing model that can express it.
+def fits_at(points: Sequence[GridPoint], *, model: str) -> list[FitFigures]:
+    """Whether the network at each point fits its own period under a timing model that can express it."""
+    found: dict[int, FitFigures] = {}
+    for places, network in _in_arrays(points):
+        numbers = fit_numbers(network, model=model)
+        each = numbers.at_points(len(places)) if len(places) > 1 else [numbers]
+        found |= {place: at.figures() for place, at in zip(places, each, strict=True)}
+    return [found[place] for place in range(len(points))]
 
-    The most nodes of a group do not depend on how many it has: settings that differ in nothing else share them.
+
+def capacities(network: Network, points: Sequence[GridPoint]) -> list[tuple[CapacityFigures, ...]]:
+    """Capacity at each point of a network's grid, under every timing model that can express it.
+
+    The most nodes of a group do not depend on how many it has: points that differ in nothing else share them.
     """
-    models = [model_names(setting.network) for setting in settings]
-    results: list[tuple[CapacityFigures, ...]] = [() for _ in settings]
+    models = [model_names(point.network) for point in points]
+    results: list[tuple[CapacityFigures, ...]] = [() for _ in points]
     for model in (model.name for model in network.bus.timing_models):
         places = [place for place, names in enumerate(models) if model in names]
-        at = [settings[place] for place in places]
+        at = [points[place] for place in places]
         of_groups = [_counts(at, group, model=model) for group in network.profile.node_groups]
-        for place, counts in zip(places, zip(*of_groups, strict=True) if of_groups else [()] * len(at), strict=True):
-            results[place] += (with_counts(figures(settings[place].network, model=model), counts),)
+        for place, fit, *counts in zip(places, fits_at(at, model=model), *of_groups, strict=True):
+            results[place] += (with_counts(fit, tuple(counts)),)
     return results
 
 
-def _counts(settings: Sequence[Setting], group: ProfileGroup, *, model: str) -> list[GroupCapacity]:
-    """Capacity of a group at each setting, in arrays where its kind has them."""
-    points = {setting.without(group.nodes_key): setting.network for setting in settings}
-    words: dict[_Changes, Counts] = {}
-    alike: dict[_Changes, list[_Changes]] = {}
-    for point, network in points.items():
-        if has_arrays(network):
-            # What is no number is the same at all points of an array.
-            alike.setdefault(tuple((key, None if _is_number(value) else value) for key, value in point), []).append(
-                point
-            )
-        else:
-            most, safe = most_and_safe_nodes(network.varying(group.name).with_nodes, network, model=model)
-            words[point] = most.words, safe and safe.words
-    for of_array in alike.values():
-        columns = zip(*([value for _, value in point] for point in of_array), strict=True)
-        values = {
-            key: np.array(column, float) if _is_number(column[0]) else column[0]
-            for (key, _), column in zip(of_array[0], columns, strict=True)
-        }
-        network = trial(points[of_array[0]], values).varying(group.name)
-        found = most_and_safe_nodes(network.with_nodes, network, model=model)
-        words |= zip(of_array, counts_at(found, len(of_array)), strict=True)
+def _counts(points: Sequence[GridPoint], group: ProfileGroup, *, model: str) -> list[GroupCapacity]:
+    """Capacity of a group at each point."""
+    keys = [point.without(group.nodes_key) for point in points]
+    different = dict(zip(keys, points, strict=True))
+    names = [*different]
+    counts: dict[tuple[object, ...], Any] = {}
+    for places, network in _in_arrays([*different.values()], without=group.nodes_key):
+        varying = network.varying(group.name)
+        found = most_and_safe_nodes(varying.with_nodes, varying, model=model)
+        counts |= zip((names[place] for place in places), counts_at(found, len(places)), strict=True)
     return [
-        GroupCapacity.of(_group(setting.network, group.name), *words[setting.without(group.nodes_key)])
-        for setting in settings
+        GroupCapacity.of(point.network.varying(group.name).varied_group, *counts[key])
+        for point, key in zip(points, keys, strict=True)
     ]
 
 
-def _group(network: Network, name: str) -> ProfileGroup:
-    return network.varying(name).varied_group
+def _in_arrays(points: Sequence[GridPoint], *, without: str = "") -> Iterator[tuple[list[int], Network]]:
+    """Networks that stand for several points, in arrays where a kind has them: the places of the points, and each."""
+    alike: dict[object, list[int]] = {}
+    for place, point in enumerate(points):
+        # What is no number is the same at all points of an array.
+        words = tuple((key, None if _is_number(value) else value) for key, value in point.without(without))
+        alike.setdefault(words if has_arrays(point.network) else place, []).append(place)
+    for places in alike.values():
+        first = points[places[0]]
+        if len(places) == 1:
+            yield places, first.network
+            continue
+        import numpy as np
+
+        values = {
+            key: np.array([points[place].changes[key] for place in places], float) if _is_number(value) else value
+            for key, value in first.without(without)
+        }
+        yield places, trial(first.network, values)
 
 
 def _is_number(value: object) -> bool:

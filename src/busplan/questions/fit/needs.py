@@ -161,16 +161,29 @@ def missed_limits(network: Network) -> tuple[MissedLimit, ...]:
     return tuple(missed)
 
 
-def unmet(network: Network) -> list[Need]:
-    """Needs that a network does not meet at its own period; empty where every constraint of a plan holds."""
+def needs_of(network: Network) -> tuple[Need, ...]:
+    """All that a plan asks of a network's period; its own period plays no part."""
+    return (*to_be_shown(network), *_of_limits(network))
+
+
+def unmet(network: Network, needs: Iterable[Need] | None = None) -> list[Need]:
+    """Needs that a network does not meet at its own period; empty where every constraint of a plan holds.
+
+    Parameters
+    ----------
+    network
+        The network.
+    needs
+        Its `needs_of`, if they are known.
+    """
     limits = network.bus.limits
     broken = [limit for limit in limits if limit.role == "period" and limit.is_broken(network)]
-    needs = list(_unmet([*to_be_shown(network), *_of_limits(network)], network))
-    if not broken and not needs:
+    found = list(_unmet(needs_of(network) if needs is None else needs, network))
+    if not broken and not found:
         # What a limit needs of the slice was computed at the shortest period.
         broken = [limit for limit in limits if limit.has_period and limit.shown.is_broken(network)]
-        needs = [Need(inf, missed.key, missed.words) for missed in missed_limits(network)]
-    return [*(Need(inf, limit.key, limit.words(network)) for limit in broken), *needs]
+        found = [Need(inf, missed.key, missed.words) for missed in missed_limits(network)]
+    return [*(Need(inf, limit.key, limit.words(network)) for limit in broken), *found]
 
 
 def _unmet(needs: Iterable[Need], network: Network) -> Iterator[Need]:

@@ -2,11 +2,12 @@
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from itertools import product
 from math import ceil
-from typing import Any, Final, Literal, NamedTuple, get_args
+from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 
@@ -24,8 +25,8 @@ from busplan.questions.base.arguments import ProfileLike, load_network, require_
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
-from busplan.questions.fit.figures import FitFigures, figures, safe_nodes, shortest_period_us
-from busplan.questions.fit.grid import AXES, Setting, setting_at
+from busplan.questions.fit.figures import FitFigures, safe_nodes, shortest_period_us
+from busplan.questions.fit.grid import AXES, Grid, GridPoint, GridPoints, fits_at, points_of
 from busplan.questions.fit.network import PERIOD, at_period
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (
@@ -33,10 +34,11 @@ from busplan.questions.sweep.circles import (
     require_executor,
     run_points,
 )
-from busplan.questions.sweep.grid import require_keys
+from busplan.questions.sweep.values import require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile, varied_nodes
 
+_Item = TypeVar("_Item")
 MOST_VALUES: Final = 64
 """Most values of a direction, enough for every gap count of IEEE 1394: more do not fit into 80 columns."""
 
@@ -249,79 +251,55 @@ def map_(
         across, up = direction(network.profile, x, name="x", with_circle=circle), None
     else:
         across, up = directions(network, x, y, with_circle=circle)
-    possible = settings_of(network, across, up)
-    found = {
-        place: figures(setting.network, model=network.bus.deciding_model)
-        for place, setting in possible.settings.items()
-    }
-    return map_of(possible, found, circle=circle, executor=executor, progress=progress)
+    points = possible_points(network, across, up)
+    fits = fits_at([*points.possible.values()], model=network.bus.deciding_model)
+    return map_of(network, across, up, points, fits, circle=circle, executor=executor, progress=progress)
 
 
-class Grid(NamedTuple):
-    """The settings of a map."""
-
-    network: Network
-    x: Direction
-    y: Direction | None
-    settings: Mapping["_Place", Setting]
-    """Those that a profile can have, by row and column."""
-    refused: Mapping["_Place", str]
-    """Reason why there is none at the other places."""
-
-    def values_at(self, place: "_Place") -> tuple[Value, Value | None]:
-        """Values along x and y."""
-        row, column = place
-        return self.x.values[column], None if self.y is None else self.y.values[row]
-
-
-def settings_of(network: Network, x: Direction, y: Direction | None) -> Grid:
-    """The settings of two directions.
+def possible_points(network: Network, x: Direction, y: Direction | None) -> GridPoints:
+    """The points of two directions, column by column.
 
     Raises
     ------
     BusplanError
-        No setting can exist.
+        A profile can have none of them.
     """
-    settings: dict[_Place, Setting] = {}
-    refused: dict[_Place, str] = {}
-    for row, value_y in enumerate((None,) if y is None else y.values):
-        for column, value_x in enumerate(x.values):
-            values = {x.key: value_x} | ({y.key: value_y} if y is not None and value_y is not None else {})
-            setting = setting_at(network, values)
-            if isinstance(setting, Setting):
-                settings[row, column] = setting
-            else:
-                refused[row, column] = setting
-    if not settings:
-        raise BusplanError(f"no setting of this map can exist: {next(iter(refused.values()))}")
-    return Grid(network, x, y, settings, refused)
+    along = (x,) if y is None else (x, y)
+    points = points_of(network, Grid({one.key: np.array(one.values, dtype=object) for one in along}))
+    if not points.possible:
+        raise BusplanError(f"no setting of this map can exist: {next(iter(points.refused.values()))}")
+    return points
 
 
 def map_of(
-    grid: Grid,
-    found: Mapping["_Place", FitFigures],
+    network: Network,
+    x: Direction,
+    y: Direction | None,
+    points: GridPoints,
+    fits: Sequence[FitFigures],
     *,
     circle: bool,
     executor: Executor | None,
     progress: Progress,
 ) -> MapAnswer:
-    """The map of a grid from the figures under the model that decides, with circle tests where they are asked for."""
-    network = grid.network
+    """The map of some points from the figures of each under the model that decides, with circle tests if asked for."""
+    values = [*product(x.values, (None,) if y is None else y.values)]
     cells = {
-        place: _cell(setting.network, found[place], *grid.values_at(place)) for place, setting in grid.settings.items()
+        number: _cell(point.network, fit, *values[number])
+        for (number, point), fit in zip(points.possible.items(), fits, strict=True)
     }
     if circle:
-        fitting = {place: grid.settings[place] for place, cell in cells.items() if cell.state == FITS}
+        fitting = {number: points.possible[number] for number, cell in cells.items() if cell.state == FITS}
         cells |= _with_circles(network.profile, fitting, cells, executor=executor, progress=progress)
-    rows = tuple(
-        tuple(
-            cells.get((row, column)) or NotDrawn(*grid.values_at((row, column)), grid.refused[row, column])
-            for column in range(len(grid.x.values))
-        )
-        for row in range(1 if grid.y is None else len(grid.y.values))
-    )
-    bus = network.bus
-    return MapAnswer(network.profile, bus.figures, bus.safety, bus.deciding_model, grid.x, grid.y, rows, circle)
+    drawn = [cells.get(number) or NotDrawn(*at, points.refused[number]) for number, at in enumerate(values)]
+    bus, rows = network.bus, in_rows(drawn, columns=len(x.values))
+    return MapAnswer(network.profile, bus.figures, bus.safety, bus.deciding_model, x, y, rows, circle)
+
+
+def in_rows(items: Sequence[_Item], *, columns: int) -> tuple[tuple[_Item, ...], ...]:
+    """What stands column by column, row by row."""
+    height = len(items) // columns
+    return tuple(tuple(items[row::height]) for row in range(height))
 
 
 def directions(network: Network, x: Along | None, y: Along | None, *, with_circle: bool) -> tuple[Direction, Direction]:
@@ -434,7 +412,8 @@ def design_value(key: str, profile: Profile) -> Any:
 
 def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
     """The verdict of `capacity` at a setting, before any circle test."""
-    unsafe = tuple(limit.key for limit in network.bus.limits if limit.role == "safety" and limit.is_broken(network))
+    safety = () if fit.safe else (limit for limit in network.bus.limits if limit.role == "safety")
+    unsafe = tuple(limit.key for limit in safety if limit.is_broken(network))
     verdict: Any = fit.verdict  # there is one under the timing model that decides
     state: State = verdict
     limits: tuple[str, ...] = () if verdict == FITS else fit.behind or (TIME,)
@@ -457,31 +436,27 @@ def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
     )
 
 
-_Place = tuple[int, int]
-"""Row and column of a cell."""
-
-
 def _with_circles(
     profile: Profile,
-    settings: Mapping[_Place, Setting],
-    cells: Mapping[_Place, Cell],
+    points: Mapping[int, GridPoint],
+    cells: Mapping[int, Cell],
     *,
     executor: Executor | None,
     progress: Progress,
-) -> dict[_Place, Cell]:
-    """Cells of settings that fit, with the results of their circle tests."""
-    if len(settings) > MOST_CIRCLES_UNASKED:
+) -> dict[int, Cell]:
+    """Cells of points that fit, with the results of their circle tests."""
+    if len(points) > MOST_CIRCLES_UNASKED:
         raise BusplanError(
-            f"{len(settings):,} settings fit, and a map runs up to {MOST_CIRCLES_UNASKED:,} circle tests; "
+            f"{len(points):,} settings fit, and a map runs up to {MOST_CIRCLES_UNASKED:,} circle tests; "
             "give fewer values"
         )
     refused = {
         place: tuple(cause.name for cause in causes)
-        for place, setting in settings.items()
-        if (causes := refusals(setting.network))
+        for place, point in points.items()
+        if (causes := refusals(point.network))
     }
-    run = [place for place in settings if place not in refused]
-    results = run_points(profile, [settings[place].changes for place in run], executor=executor, progress=progress)
+    run = [place for place in points if place not in refused]
+    results = run_points(profile, [points[place].changes for place in run], executor=executor, progress=progress)
     return {
         **{place: cells[place]._replace(state="circle cannot be run", reasons=refused[place]) for place in refused},
         **{place: _judged(cells[place], result) for place, result in zip(run, results, strict=True)},

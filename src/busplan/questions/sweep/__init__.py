@@ -25,11 +25,12 @@ from busplan.questions.base.arguments import (
     with_its_constants,
 )
 from busplan.questions.circle import CIRCLE_BY_KEY
+from busplan.questions.fit.grid import Array
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor
 from busplan.questions.sweep.digest import first_rows, sentences
-from busplan.questions.sweep.grid import Array, Columns, axis_values
 from busplan.questions.sweep.rows import arrow_table, written_rows
-from busplan.questions.sweep.table import Sweep, checked_sweep, column_figures, figure_table
+from busplan.questions.sweep.table import Columns, Sweep, checked_sweep, column_figures, figure_table
+from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:

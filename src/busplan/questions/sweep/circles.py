@@ -13,8 +13,8 @@ from busplan.questions.circle import CircleFigures
 from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup_of
 from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import figures
+from busplan.questions.fit.grid import Array, Grid
 from busplan.questions.fit.network import network_of
-from busplan.questions.sweep.grid import Array, Grid
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
 

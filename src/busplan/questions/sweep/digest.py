@@ -22,9 +22,8 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.sweep.grid import Columns
 from busplan.questions.sweep.rows import plain_rows
-from busplan.questions.sweep.table import Sweep, column_figures
+from busplan.questions.sweep.table import Columns, Sweep, column_figures
 from busplan.sections.profile import Profile
 
 _RANKS: Final[Mapping[str, int]] = MappingProxyType(

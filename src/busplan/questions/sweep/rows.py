@@ -13,8 +13,8 @@ from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell, spelled
 from busplan.profile.edit import profile_text
 from busplan.questions.base.sentences import changed_document, document
-from busplan.questions.sweep.grid import Array, Columns
-from busplan.questions.sweep.table import Sweep, column_figures
+from busplan.questions.fit.grid import Array
+from busplan.questions.sweep.table import Columns, Sweep, column_figures
 
 if TYPE_CHECKING:
     import pyarrow as pa

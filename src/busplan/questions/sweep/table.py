@@ -7,38 +7,35 @@ added here.
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, reduce
-from math import inf, prod
+from math import prod
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.buses.cycle import BusCycle
-from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, BusFigures, Figure, Sort, by_key
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Safety
+from busplan.buses.figure import FITS, TIMING_MODEL, BusFigures, Figure, Sort, by_key
+from busplan.buses.limits import NOT_SHOWN_KEPT, Safety
 from busplan.buses.network import Network
 from busplan.elementwise import Number
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
-from busplan.questions.fit.certainty import (
-    TIME,
-    VERDICTS,
-    certainty,
-    fits_in,
-    limit_codes,
-    time_code,
-    verdict_code,
-)
-from busplan.questions.fit.figures import COUNTS, MostNodes, certainty_numbers, most_and_safe_nodes, numeric_figures
+from busplan.questions.fit.certainty import VERDICTS, verdict_code
+from busplan.questions.fit.figures import COUNTS, MostNodes, fit_numbers, most_and_safe_nodes
+from busplan.questions.fit.grid import Array, Grid
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
-from busplan.questions.sweep.grid import Array, Columns, Grid, axis_values, checked_grid, grid_models
+from busplan.questions.sweep.values import axis_values, checked_grid, grid_models
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile, varied_nodes
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays fit into the processor's cache."""
 
+Columns = dict[str, Array]
+"""Columns by name, a row for each point and timing model, each of shape (rows,).
+
+Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
+"""
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
 
@@ -186,23 +183,21 @@ def _joined(parts: list[Array], *, axis: int) -> Array:
 
 def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
     """All figures of a network whose keys hold arrays."""
-    bus = network.bus
-    cycle = bus.cycle(network, model=model)
-    figures = numeric_figures(cycle)
-    terms = {term.key: term.us if network.groups else inf for term in cycle.terms}
-    late = np.logical_not(np.asarray(fits_in(figures["required_us"], available_us=figures["available_us"])))
-    codes = limit_codes(network)
-    broken = {**_where(codes, BROKEN), TIME: late}
-    numbers = {**figures, **cycle.figures(), **terms, FITS.key: np.logical_not(reduce(np.logical_or, broken.values()))}
+    fit = fit_numbers(network, model=model)
+    numbers = {**fit.numbers, **fit.own, FITS.key: np.logical_not(reduce(np.logical_or, fit.broken.values()))}
     words = {
         TIMING_MODEL.key: _objects([model]),
-        "binding_term": _chosen([term.name for term in cycle.terms], _largest([*terms.values()]))
-        if network.groups
+        "binding_term": _chosen([term.name for term in fit.terms], _largest([term.us for term in fit.terms]))
+        if fit.terms
         else _objects([None]),
-        "exceeded": _sets(broken),
-        **(_certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED),
+        "exceeded": _sets(fit.broken),
+        "not_shown": _sets({key: np.equal(code, NOT_SHOWN_KEPT) for key, code in fit.codes.items()})
+        if fit.decides
+        else _objects([None]),
+        "verdict": _chosen(VERDICTS, np.asarray(verdict_code(fit.codes), int)) if fit.decides else _objects([None]),
         **_counts(network, model=model, group=group),
     }
+    bus = network.bus
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
     return {
         key: words[key] if key in words else _number(numbers[key], sorts[key])
@@ -221,12 +216,6 @@ def _chosen(words: Sequence[object], codes: Array) -> Array:
 
 
 _NO_NUMBER: Final = np.full((), np.nan)
-_UNDECIDED: Final = {
-    figure.key: _objects([None]) if figure.sort in ("word", "words") else _NO_NUMBER
-    for figure in CERTAINTY
-    if figure.key not in COUNTS
-}
-"""Figures that a timing model does not have."""
 
 
 def _number(number: Number | None, sort: Sort) -> Array:
@@ -280,26 +269,9 @@ def _limit_keys(most: MostNodes) -> Array:
     return _chosen([limit.key for limit in most.limits], np.asarray(most.limit, int))
 
 
-def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Array]:
-    """Figures of how sure the verdict is, of a cycle under the timing model that decides."""
-    sure = certainty(cycle)
-    codes = {**limits, TIME: time_code(sure, cycle.network)}
-    sorts = {figure.key: figure.sort for figure in CERTAINTY}
-    return {
-        **{key: _number(number, sorts[key]) for key, number in certainty_numbers(sure, cycle).items()},
-        "not_shown": _sets(_where(codes, NOT_SHOWN_KEPT)),
-        "verdict": _chosen(VERDICTS, np.asarray(verdict_code(codes), int)),
-    }
-
-
-def _where(codes: Mapping[str, Number], code: int) -> dict[str, Array]:
-    """Where each limit has a verdict."""
-    return {key: np.equal(np.asarray(place), code) for key, place in codes.items()}
-
-
-def _sets(flags: Mapping[str, Array]) -> Array:
+def _sets(flags: Mapping[str, Number]) -> Array:
     """The keys that are flagged, as a tuple at each point."""
-    codes: Array = np.asarray(sum(flag.astype(int) << bit for bit, flag in enumerate(flags.values())))
+    codes: Array = np.asarray(sum(np.asarray(flag, int) << bit for bit, flag in enumerate(flags.values())))
     words: Array = _combinations(tuple(flags))[np.atleast_1d(codes)]
     return words
 

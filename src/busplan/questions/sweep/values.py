@@ -1,14 +1,13 @@
-"""The grid of a sweep: its points, and the values of each key, from text or from Python, checked."""
+"""Values of the keys that vary in a grid, from text or from Python, checked."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from decimal import Decimal, localcontext
-from itertools import islice, product
-from math import isfinite, prod
-from typing import Any, Final, NamedTuple, TypeGuard
+from itertools import islice
+from math import isfinite
+from typing import Final, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
@@ -18,77 +17,14 @@ from busplan.profile.document import override
 from busplan.profile.edit import whole
 from busplan.profile.kinds import cycle_keys, dotted_keys, words_of
 from busplan.questions.base.arguments import checked_model, items
+from busplan.questions.fit.grid import Array, Grid
 from busplan.questions.fit.network import changed, model_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
-
-Array = NDArray[Any]
-"""Numbers, truth values, or objects if there are words among them."""
-Columns = dict[str, Array]
-"""Columns by name, a row for each point and timing model, each of shape (rows,).
-
-Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
-"""
 
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
 MOST_POINTS: Final = 1_000_000
 """Most points of a sweep: the work on them takes up to two gigabytes of memory."""
-
-
-class Chunk(NamedTuple):
-    """A contiguous part of a grid."""
-
-    shape: tuple[int, ...]
-    """Points along each axis of the grid."""
-    values: dict[str, Array]
-    """Values of each key, shaped to broadcast along its own axis."""
-
-
-class Grid(NamedTuple):
-    """Every combination of the values of some keys; the last key changes fastest."""
-
-    axes: dict[str, Array]
-    """Values by key, each of shape (values,): whole numbers, floats, or objects if there are words among them."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Values of each key."""
-        return tuple(axis.size for axis in self.axes.values())
-
-    @property
-    def points(self) -> int:
-        """How many points."""
-        return prod(self.shape)
-
-    def each_point(self) -> Iterator[dict[str, object]]:
-        """Values of the keys of each point."""
-        points = product(*(axis.tolist() for axis in self.axes.values()))
-        return (dict(zip(self.axes, point, strict=True)) for point in points)
-
-    def chunks(self, most: int) -> Iterator[Chunk]:
-        """Split the grid.
-
-        Parameters
-        ----------
-        most
-            Largest number of points of a chunk.
-
-        Yields
-        ------
-        Chunk
-            In row-major order.
-        """
-        # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
-        cut = next(number for number in range(len(self.shape) + 1) if prod(self.shape[number + 1 :]) <= most)
-        width = max(1, most // prod(self.shape[cut + 1 :]))
-        parts = [
-            *([slice(index, index + 1) for index in range(size)] for size in self.shape[:cut]),
-            *([slice(begin, begin + width) for begin in range(0, size, width)] for size in self.shape[cut : cut + 1]),
-            *([slice(size)] for size in self.shape[cut + 1 :]),
-        ]
-        for part in product(*parts):
-            values = [axis[places] for axis, places in zip(self.axes.values(), part, strict=True)]
-            yield Chunk(tuple(map(len, values)), dict(zip(self.axes, np.ix_(*values), strict=True)))
 
 
 def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bool) -> Grid:
