@@ -47,7 +47,9 @@ def test_map_sweep_and_explore_say_of_each_setting_what_capacity_says(
             for result in alone.results:
                 row = next(rows)
                 figures = result.by_key()
-                assert {key: repr(row[key]) for key in figures} == {key: repr(value) for key, value in figures.items()}
+                assert {
+                    key: row[key] for key in figures
+                } == figures  # bit for bit: the same operations in the same order
             assert [card] == [block for block in alone.report().blocks if isinstance(block, Card)]
             shared = ("nodes", "axes", "verdict", "binding_term", "available_us", "margin_corrected_us")
             for key in (*shared, "uncertainty_us"):

@@ -130,7 +130,7 @@ _PLAUSIBLE: Final = 128
 """More nodes are tried only where so many keep every limit: a cycle of a million takes long to count."""
 
 
-def _most_nodes(with_nodes: Callable[[Number], Network], limits: Sequence[Limit], *, ceiling: int) -> MostNodes:
+def _most_nodes(with_nodes: Callable[[Number], Network], limits: Sequence[Held], *, ceiling: int) -> MostNodes:
     nodes: Number = ceiling
     most: dict[int, Number] = {}
     order = sorted(range(len(limits)), key=lambda index: limits[index].is_slow)
@@ -401,7 +401,7 @@ class FitNumbers(NamedTuple):
 
         def rows(numbers: Iterable[Number | None]) -> Iterator[tuple[Any, ...]]:
             columns = (repeat(None) if one is None else np.broadcast_to(one, points).tolist() for one in numbers)
-            return (row for _, *row in zip(range(points), *columns, strict=False))
+            return (row[1:] for row in zip(range(points), *columns, strict=False))
 
         parts = (self.numbers, self.own, self.codes, self.broken)
         terms, doubts = (rows(part.us for part in parts) for parts in (self.terms, self.doubts))
