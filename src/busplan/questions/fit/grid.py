@@ -9,6 +9,7 @@ from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import (
     CapacityFigures,
+    Counts,
     FitFigures,
     GroupCapacity,
     counts_at,
