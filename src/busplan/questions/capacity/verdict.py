@@ -126,9 +126,9 @@ class _Judged(NamedTuple):
     missed: tuple[MissedLimit, ...]
     mending: Cure
     """The change that mends what is wrong, or that makes room for one more node on a full bus."""
-    mended: Network | None
-    """The network after that change; None without one."""
-    reset: Network | None
+    mended: GridPoint | None
+    """The network after that change, and with one more node where it makes room; None without a change."""
+    reset: GridPoint | None
     """The network after a bus reset; None where that does not matter."""
 
 
@@ -152,20 +152,18 @@ def verdicts_of(
         progress(number, len(points))
         shared = variants.setdefault(point.without(PERIOD), Variants(point.network))
         judged.append(_judged(point.network, figures, shared))
-    mended = _fits_after(points, [(one.mending.changes or {}, one.mended) for one in judged])
-    resets = _fits_after(points, [(points[0].network.bus.safety.after_reset, one.reset) for one in judged])
+    mended = _fits_after(points, [one.mended for one in judged])
+    resets = _fits_after(points, [one.reset for one in judged])
     rows = zip(results, judged, mended, resets, strict=True)
     return [_verdict(point.network, *row) for point, row in zip(points, rows, strict=True)]
 
 
-def _fits_after(
-    points: Sequence[GridPoint], changed: Sequence[tuple[Changes, Network | None]]
-) -> list[FitFigures | None]:
-    """Figures of networks after changes, under the model that decides; None where there is no such network."""
+def _fits_after(points: Sequence[GridPoint], changed: Sequence[GridPoint | None]) -> list[FitFigures | None]:
+    """Figures of points after further changes, under the model that decides; None where there are none."""
     after = {
-        place: GridPoint(point.changes | dict(changes), network)
-        for place, (point, (changes, network)) in enumerate(zip(points, changed, strict=True))
-        if network is not None
+        place: GridPoint(point.changes | further.changes, further.network)
+        for place, (point, further) in enumerate(zip(points, changed, strict=True))
+        if further is not None
     }
     fits = fits_at([*after.values()], model=points[0].network.bus.deciding_model)
     found = dict(zip(after, fits, strict=True))
@@ -179,7 +177,9 @@ def _judged(network: Network, results: tuple[CapacityFigures, ...], variants: Va
     )
     missed = missed_limits(network)
     mending, mended = _change(Variant(network, variants), deciding, is_missed=bool(missed))
-    return _Judged(deciding, variants, missed, mending, mended, reset(network, deciding))
+    after = reset(network, deciding)
+    of_reset = None if after is None else GridPoint(dict(network.bus.safety.after_reset), after)
+    return _Judged(deciding, variants, missed, mending, mended, of_reset)
 
 
 def _verdict(
@@ -213,20 +213,22 @@ def _verdict(
     return Verdict(**vars(judged), card=card, brief_card=brief_card)
 
 
-def _change(target: Variant, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, Network | None]:
+def _change(target: Variant, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, GridPoint | None]:
     """The change that mends what is wrong or makes room on a full bus for one more node, and the network after it."""
+    more: Changes = {}
     if now.verdict == FITS and now.safe and not is_missed:
         if now.safe_nodes is None or now.safe_nodes > now.nodes:
             return Cure(None), None  # there is room, or nobody said which of the groups is to grow
         if now.safe_nodes == MAX_COUNT:
             return Cure(None, f"{MAX_COUNT} nodes are the most that a profile can have"), None
-        one_more = target.after(more := {NODES: now.safe_nodes + 1})
+        more = {NODES: now.safe_nodes + 1}
+        one_more = target.after(more)
         if one_more is None:
             return Cure(None, _refusal(target.network, more)), None
         target = one_more
     mending = cure(*target)
     after = None if mending.changes is None else target.after(mending.changes)
-    return mending, after and after.network
+    return mending, None if after is None else GridPoint({**more, **(mending.changes or {})}, after.network)
 
 
 def _refusal(network: Network, changes: Changes) -> str:

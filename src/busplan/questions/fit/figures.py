@@ -415,7 +415,7 @@ class FitNumbers(NamedTuple):
 
         def rows(numbers: Iterable[Number | None]) -> Iterator[tuple[Any, ...]]:
             columns = (repeat(None) if one is None else np.broadcast_to(one, points).tolist() for one in numbers)
-            return (tuple(row) for _, *row in zip(range(points), *columns, strict=False))
+            return (row[1:] for row in zip(range(points), *columns, strict=False))
 
         parts = (self.numbers, self.own, self.codes, self.broken)
         terms, doubts = (rows(part.us for part in parts) for parts in (self.terms, self.doubts))

@@ -9,6 +9,7 @@ from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import (
     CapacityFigures,
+    Counts,
     FitFigures,
     GroupCapacity,
     counts_at,
@@ -178,8 +179,8 @@ def _counts(points: Sequence[GridPoint], group: ProfileGroup, *, model: str) -> 
     """Capacity of a group at each point."""
     keys = [point.without(group.nodes_key) for point in points]
     different = dict(zip(keys, points, strict=True))
-    names = [*different]
-    counts: dict[tuple[object, ...], Any] = {}
+    names: list[_Changes] = [*different]
+    counts: dict[_Changes, Counts] = {}
     for places, network in _in_arrays([*different.values()], without=group.nodes_key):
         varying = network.varying(group.name)
         found = most_and_safe_nodes(varying.with_nodes, varying, model=model)
