@@ -99,7 +99,7 @@ def test_an_overrun_is_said_and_seen() -> None:
     said = "used 270 us of the 150 that the bus may use, 180 %; short by 120 us, +/- 6."
     assert lines[0] == f"paper-4ms at 300 us: does not fit by the standard model; {said}"
     paper = drawn(busplan.timeline(profile(cycle__period_us=300.0), timing_model="paper"))
-    said = "57.117 us short, 207.117 us needed of 150.000 us by the paper model, which does not affect the verdict."
+    said = "short by 57.117 us: needs 207.117 us of 150.000 us by the paper model, which does not affect the verdict."
     assert paper[0] == f"paper-4ms at 300 us: {said}"
     assert headline(one).state == "fails"
     over = row(lines, "over")

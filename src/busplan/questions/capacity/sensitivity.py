@@ -145,7 +145,7 @@ def _slower(network: Network) -> Perturbed:
 def _one_node_more(network: Network, group: ProfileGroup) -> Perturbed:
     more = group.nodes + 1
     grown = network.varying(group.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, grown, "")
+    return Perturbed(f"one more node{_in(group)}", group.nodes_key, group.nodes, more, grown, "")
 
 
 def _one_axis_more(network: Network, group: ProfileGroup) -> Perturbed:
