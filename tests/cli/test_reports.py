@@ -128,7 +128,7 @@ def test_what_moves_the_margin_is_asked_for(run: Run) -> None:
     (verdict,) = verdicts(run, "paper-4ms", "--sensitivity", "--period", "600us", "--set", "bus.gap_count=8")
     rows = {one["change"]: one for one in verdict["sensitivity"]}
     for change, *keys in (
-        ("one node more", "bus.nodes=3", "bus.gap_count=8"),
+        ("one more node", "bus.nodes=3", "bus.gap_count=8"),
         ("a bus reset", "bus.gap_count=63"),
         ("host time +10 us", "bus.gap_count=8", "host.transaction_us=10"),
     ):

@@ -39,7 +39,7 @@ def capacity_command(
         typer.Option(
             "--sensitivity",
             help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop "
-            "or one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. "
+            "or one more retry, 10 us more host time, or a bus reset, one at a time; and what binds next. "
             "CSV has these rows instead, and a picture their bars.",
         ),
     ] = False,

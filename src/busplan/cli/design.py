@@ -171,7 +171,7 @@ def _check_options(
     if new == STANDARD_OUTPUT and format_ not in (None, "table"):
         problems.append(f"--format {format_} and -o -: standard output takes one document; give -o a file")
     if force and new is None:
-        problems.append("--force: goes with -o NEW.toml")
+        problems.append("--force: needs -o NEW.toml")
     if problems:
         raise BusplanError(*problems)
 
@@ -578,7 +578,7 @@ def import_command(
         typer.Option(
             metavar="RATE",
             help="Bit rate of a CAN bus, before that of any file [kbit/s].  [default: that of a file, or that "
-            "which frames of a log directly after each other show]",
+            "which back-to-back frames in a log show]",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,

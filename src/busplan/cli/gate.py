@@ -144,9 +144,11 @@ class _Baseline:
         of_baseline = {"--update-baseline": self.update_baseline, "--pass-on-unmatched": self.pass_on_unmatched}
         require_company("--baseline FILE", of_baseline, is_given=path)
         if self.update_baseline and self.pass_on_unmatched:
-            raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
+            raise BusplanError("--pass-on-unmatched: cannot be used with --update-baseline")
         if self.update_baseline and changes.entries:
-            raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
+            raise BusplanError(
+                f"--update-baseline: cannot be used with {changes.words}: it records the files as they are"
+            )
         if self.update_baseline and path is not None:
             require_changeable(path)
         return path
@@ -437,7 +439,7 @@ def rule_command(
         ),
     ] = None,
 ) -> "Report":
-    """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
+    """Explain a rule of `busplan check`: the problem, why it matters, and the remedy.
 
     Without a code it lists all rules with their severity. Exits 0.
 

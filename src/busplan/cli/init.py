@@ -130,7 +130,7 @@ def init_command(
     else:
         if values.given:
             options = " and ".join(values.given)
-            raise BusplanError(f"--from: goes without {options}: a copy has the values of its profile")
+            raise BusplanError(f"--from: cannot be used with {options}: a copy has the values of its profile")
         text = starter_text(source, name=path.stem)
     write_file(path, text.encode(), overwrite=force)
     defaults = [f"not given, so taken: {' '.join(values.taken)}"] if values.taken else []
@@ -235,7 +235,7 @@ def _machine(kind: str, values: _Values) -> "Machine":
 
     starter, groups = kind_named(kind).starter, _groups(values.given.get("--group", []))
     if groups and values.given.keys() & {"--nodes", "--axes"}:
-        raise BusplanError("--group: goes without --nodes and --axes: each group says its own")
+        raise BusplanError("--group: cannot be used with --nodes or --axes: each group says its own")
     if not groups:
         nodes = values.number("--nodes", "Nodes, the host not counted", _NODES)
         axes = values.number("--axes", "Axes of all nodes", _AXES_PER_NODE * nodes)
@@ -255,7 +255,7 @@ def _machine(kind: str, values: _Values) -> "Machine":
     if host is not None and host not in starter.hosts:
         kinds = listed([name for name in kind_names() if kind_named(name).starter.hosts], "or")
         known = f"there are {', '.join(starter.hosts)}"
-        raise BusplanError(f"--host {host}: {known if starter.hosts else f'goes with --bus {kinds}, not with {kind}'}")
+        raise BusplanError(f"--host {host}: {known if starter.hosts else f'only for --bus {kinds}, not for {kind}'}")
     return Machine(groups, period_us, size, host, rate=_rate(kind, values))
 
 

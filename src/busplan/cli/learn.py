@@ -106,7 +106,7 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
     columns = (
         *(TableColumn(heading, kind="words") for heading in ("profile", "bus")),
         *(TableColumn(heading) for heading in ("nodes", "axes", "period")),
-        TableColumn("what it is", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
+        TableColumn("description", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
     )
     table = Table(columns, tuple(rows), Sentence(("Shipped profiles",)))
     return Report(Sentence(("Shipped profiles",)), (table,), document("profiles", profiles=records), records)
