@@ -45,9 +45,7 @@ TERMS: Final = (
         ink="contention",
         letter="U",
     ),
-    Figure(
-        "cycle_retry_us", "T_retry", "profile", "requests that are repeated", "retries", ink="contention", letter="Y"
-    ),
+    Figure("cycle_retry_us", "T_retry", "profile", "repeated requests", "retries", ink="contention", letter="Y"),
     Figure(
         "cycle_host_us", "T_host", "profile", "the host between feedback and commands", "host", ink="work", letter="H"
     ),
