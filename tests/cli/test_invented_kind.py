@@ -304,7 +304,7 @@ def test_what_moves_its_margin_is_by_hand(run: Run, ring: Path) -> None:
         ("payload +4 bytes", -320.0, None),
         ("one more node", -128.0, None),  # the second token serves it, too
         ("execution time +10%", 0.0, None),
-        ("one axis more per node", 0.0, "no payload follows the axes"),
+        ("one more axis per node", 0.0, "no payload follows the axes"),
     ]
     following = verdict["next_bottleneck"]
     assert (following["binding_term"], following["next_binding_term"]) == ("data", "token")

@@ -33,7 +33,7 @@ UNKNOWN_SHARE: Final = Sourced(
     unit="1",
     grade="assumed",
     source="chosen",
-    meaning="standard uncertainty of a time that nobody has measured, as a share of it",
+    meaning="standard uncertainty of an unmeasured time, as a share of it",
 )
 GUESS_SHARE: Final = Sourced(
     1 / 3**0.5,
@@ -130,7 +130,7 @@ class TableExecution(GradedExecution):
         description="Payloads that were measured, ascending [bytes]", examples=[[4, 16]]
     )
     time_us: Annotated[tuple[TimeUs, ...], Field(strict=False, min_length=1)] = Field(
-        description="Execution time T_exec of each [us]", examples=[[36.7, 36.3]]
+        description="Execution time T_exec at each payload [us]", examples=[[36.7, 36.3]]
     )
 
     def _problems(self) -> Iterator[Problem]:

@@ -28,7 +28,7 @@ def with_longer_execution(profile: busplan.Profile) -> dict[str, Any]:
 WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "execution time +10%": with_longer_execution,
     "one more node": lambda profile: {"bus.nodes": profile.node_groups[0].nodes + 1},
-    "one axis more per node": lambda profile: {"node.axes": profile.node_groups[0].node.axes + 1},
+    "one more axis per node": lambda profile: {"node.axes": profile.node_groups[0].node.axes + 1},
     "payload +4 bytes": lambda profile: {
         f"payload.{kind}_bytes": 4 + (getattr(profile.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
     },
@@ -106,7 +106,7 @@ def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None
     by_change = effects(make())
     for change, note in (
         ("a bus reset", "it is set so already"),
-        ("one axis more per node", "no payload follows the axes"),
+        ("one more axis per node", "no payload follows the axes"),
         ("host time +10 us", "the gaps after the transactions hide it"),
     ):
         assert (by_change[change].margin_change_us, by_change[change].note) == (0.0, note)
@@ -115,7 +115,7 @@ def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None
     execution = off["execution time +10%"]
     assert (execution.margin_change_us, execution.note) == (0.0, "no execution time is on the bus")
     moved = effects(make(bus__gap_count=8, payload__read_bytes_per_axis=8))
-    assert [moved[change].note for change in ("a bus reset", "one axis more per node", "host time +10 us")] == [""] * 3
+    assert [moved[change].note for change in ("a bus reset", "one more axis per node", "host time +10 us")] == [""] * 3
 
 
 def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
@@ -124,7 +124,7 @@ def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
     assert (effect.margin_change_us, effect.then, effect.before, effect.after) == (None, None, 12, 16)
     assert effect.note == "not known: 16 bytes is outside the execution table, 4 to 14 bytes"
     data = {"node__execution": TABLE, "payload__write_bytes": 4, "payload__read_bytes": 2}
-    axis = effects(make(**data, payload__read_bytes_per_axis=3))["one axis more per node"]
+    axis = effects(make(**data, payload__read_bytes_per_axis=3))["one more axis per node"]
     assert (axis.then, axis.note) == (None, "not known: 17 bytes is outside the execution table, 4 to 14 bytes")
     # Between its points it is as known as before.
     profile = changed(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
@@ -169,7 +169,7 @@ def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
     for group in gantry.group:
         for change, key, more in (
             (f"one more node in {group.name}", "nodes", group.nodes + 1),
-            (f"one axis more per node in {group.name}", "axes", group.axes + 1),
+            (f"one more axis per node in {group.name}", "axes", group.axes + 1),
         ):
             row = rows[change]
             assert (row.key, row.before, row.after) == (f"group.{group.name}.{key}", more - 1, more)
@@ -178,7 +178,7 @@ def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
             assert row.then.margin_corrected_us == then.margin_corrected_us
             moved_us = (row.then.margin_corrected_us or 0) - (now.margin_corrected_us or 0)
             assert row.margin_change_us == moved_us
-    assert rows["one axis more per node in io"].note == "no payload follows the axes"
+    assert rows["one more axis per node in io"].note == "no payload follows the axes"
     assert [limit.group for limit in next_bottleneck(gantry).limits] == ["drives", "tool", "io"]
 
 

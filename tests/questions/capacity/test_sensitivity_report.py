@@ -70,7 +70,7 @@ def test_it_says_what_moves_the_margin_most_and_what_is_lost() -> None:
 
 def test_where_nothing_takes_the_largest_term_away_it_says_what_comes_behind() -> None:
     text = text_of(busplan.load_profile("paper-dma"))
-    assert "Next bottleneck: after idle, 84.2 us, which no key takes away, comes execution, 42.4 us;" in text
+    assert "Next bottleneck: no key removes idle, 84.2 us; the next term is execution, 42.4 us;" in text
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "ethercat-servo-8", "sercos2-servo-8"])

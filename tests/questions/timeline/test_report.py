@@ -140,9 +140,9 @@ def test_the_table_says_what_takes_how_much_of_what() -> None:
     answers = (plan(), window(from_us=100.0, to_us=180.0), plan(cycle__period_us=300.0))
     tables = [block for one in answers for block in one.report().blocks if isinstance(block, Table)]
     assert [sentence_text(table.caption) for table in tables if table.caption] == [
-        "What takes the slice, 2000.000 us",
-        "What takes the window, 80.000 us",
-        "What takes the cycle, 263.320 us",
+        "Use of the slice, 2000.000 us",
+        "Use of the window, 80.000 us",
+        "Use of the cycle, 263.320 us",
     ]
     lines = drawn(plan())
     assert lines[-2].split() == [".", "subaction", "gap", "(10)", "4", "42.196", "2.11"]

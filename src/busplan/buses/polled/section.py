@@ -99,7 +99,7 @@ class PolledBus(BusSection):
     )
     return_delay_us: TimeUs | None = Field(
         default=None,
-        description="Delay of an answer that is set in the nodes, beside node.execution; without it that of a new "
+        description="Delay of an answer set in the nodes, in addition to node.execution; by default that of a new "
         "node [us]",
         examples=[0],
     )

@@ -152,7 +152,7 @@ def _one_axis_more(network: Network, group: ProfileGroup) -> Perturbed:
     key, axes = group.node_key("axes"), group.node.axes + 1
     grown, unknown = _if_known(lambda: trial(network, {key: axes}))
     note = unknown or ("" if group.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(group)}", key, axes - 1, axes, grown, note)
+    return Perturbed(f"one more axis per node{_in(group)}", key, axes - 1, axes, grown, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:

@@ -181,7 +181,7 @@ def _last_step(derivation: Derivation) -> Iterator[Block]:
     known = (given for given in derivation.inputs if given.grade in GRADES[:-1] and _plays_a_part(given, derivation))
     weak = sorted(known, key=lambda given: GRADES.index(given.grade))[:_MOST_INPUTS]
     rows = (TableRow((Code(given.symbol), *_input_cells(given))) for given in weak)
-    caption = Sentence((f"Inputs, the least well known first; the weakest grade is {derivation.weakest_grade}",))
+    caption = Sentence((f"Inputs, the least certain first; the weakest grade is {derivation.weakest_grade}",))
     yield Table((_SYMBOL._replace(leaves="out"), *_KNOWN), tuple(rows), caption)
 
 
