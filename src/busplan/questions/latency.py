@@ -117,7 +117,7 @@ def latency(
     payload_bytes: int | Iterable[int] | None = None,
     timing_model: Models | None = None,
 ) -> LatencyAnswer:
-    """Show how long data takes to arrive, phase by phase, as `busplan latency` does.
+    """Show the delay of data, phase by phase, as `busplan latency` does.
 
     Parameters
     ----------
