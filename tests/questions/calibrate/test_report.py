@@ -47,7 +47,7 @@ def test_warnings() -> None:
         "15 slow measurements: line 1 (90 us at 4 bytes: T_exec +40.0 us off the median), line 5 (94 us at 4 bytes: "
     )
     assert warning.endswith(
-        "off the median) and 5 more; left out: the slowest execution takes 96.001 us more, worst_extra_us."
+        "off the median) and 5 more; left out. The slowest execution takes 96.001 us longer, worst_extra_us."
     )
     assert f"Warning: {warning}\n" in str(many)
     # Ten lines are named.

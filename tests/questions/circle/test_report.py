@@ -224,7 +224,7 @@ def legend_of(test: busplan.CircleTestAnswer) -> str:
 def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float, words: str) -> None:
     test = small(ranked=False, tolerance__max_contour_error_mm=tolerance_mm)
     legend = legend_of(test)
-    assert re.match(r"Magnified \d+ times; [\d.]+ um; bold: the nominal", legend)
+    assert re.match(r"Magnified \d+ times; rings every [\d.]+ um; bold: the nominal", legend)
     assert "; the dot is the start of the turn, the arrow its direction; " in legend
     assert legend.endswith(words)
     assert test.html.count('<figure class="round">') == test.html.count('class="band first"') == 1

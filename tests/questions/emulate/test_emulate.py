@@ -131,7 +131,7 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
     [
         ("can-servo-8", "late-command", 600, "within", "the plan allows this, so last PDO after SYNC is within"),
         ("can-servo-8", "jitter", 100, "within", "the plan allows this, so SYNC: jitter of the arrival is within"),
-        ("can-servo-8", "late-command", 1200, "not shown", "so last PDO after SYNC is not shown to be outside"),
+        ("can-servo-8", "late-command", 1200, "not shown", "so measured cannot show last PDO after SYNC as outside"),
         ("can-servo-8", "late-command", 3000, "outside", "measured shows last PDO after SYNC"),
         ("ethercat-servo-8", "jitter", 10, "outside", "measured shows latest start"),
     ],

@@ -77,7 +77,7 @@ class Can(Bus):
         TimingModel(
             WORST,
             "as many stuff bits as a frame of its length can have",
-            error="this timing model gives 8 to 15 % more than measured classical frames",
+            error="this timing model gives 8 to 15% more than measured classical frames",
         ),
         TimingModel(NONE, "no stuff bits"),
     )
