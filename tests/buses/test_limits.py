@@ -79,7 +79,7 @@ def test_the_slowest_group_counts(tmp_path: Path) -> None:
     assert (found.verdict, found.not_shown) == ("not shown to fit", ("node",))
     # 2 x 470 + 4 x 20 us: the next period that SERCOS III knows is 1,250 us.
     assert (found.min_period_us, found.safe_min_period_us) == (1000, 1250)
-    assert "vague: a node executes for 940.0 +/- 80.0 us of 1000.0 us" in str(busplan.capacity(one))
+    assert "vague: a node's execution takes 940.0 +/- 80.0 us of its 1000.0 us" in str(busplan.capacity(one))
     # Surely late, though the other may take longer.
     late = busplan.load_profile(one, changes={"group.quick.execution.base_us": 503.0})
     assert busplan.capacity(late).verdicts[0].deciding.verdict == "does not fit"

@@ -195,6 +195,6 @@ def test_a_margin_without_doubts_says_that_no_uncertainty_is_known(
     run: Run, name: str, nodes: int, has_doubts: bool
 ) -> None:
     said = run("capacity", name, "--set", f"bus.nodes={nodes}", "--all").stdout
-    assert "how far the bus is from this timing model is not known" in said
+    assert "the error of this timing model is not known" in said
     assert "\n  correction      none: " in said
     assert ("+/-" in said) == has_doubts

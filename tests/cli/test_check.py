@@ -183,10 +183,10 @@ def test_the_circle_can_be_left_out(busplan: Busplan, folder: Path) -> None:
     # A circle that is left out for its length is a warning.
     short = busplan("check", "circle.toml", "--circle-steps", "1000", cwd=folder)
     assert (short.returncode, short.stdout.count("BP204"), short.stdout.count("BP201")) == (0, 1, 0)
-    assert "more than 1,000: not run" in short.stdout
+    assert "over the limit of 1,000" in short.stdout
     both = busplan("check", "circle.toml", "--circle-steps", "1000", "--no-circle", cwd=folder)
     assert (both.returncode, both.stdout) == (2, "")
-    assert "--circle-steps: goes with --circle" in both.stderr
+    assert "--circle-steps: needs --circle" in both.stderr
 
 
 # Baseline
@@ -248,7 +248,7 @@ def test_a_baseline_of_other_timing_models_is_recorded_again_as_a_whole(busplan:
     assert (document["models"], list(document["profiles"])) == (2, ["p/clean.toml", "p/warns.toml"])
 
 
-CURE = "; --update-baseline adds or drops these records, --pass-on-unmatched lets them pass\n"
+CURE = "; use --update-baseline to add or drop these records, or --pass-on-unmatched to accept them\n"
 
 
 def test_a_baseline_holds_from_every_folder(busplan: Busplan, folder: Path) -> None:

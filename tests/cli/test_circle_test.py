@@ -112,7 +112,7 @@ def test_a_step_that_does_not_divide_the_period_is_a_shorter_one_that_does(circl
         (["-o", "c.pdf"], "for a PDF write .svg: a browser prints it"),
         (["--trace", "no/where/t.csv"], "cannot be written"),
         (["--trace", "."], "cannot be written"),
-        (["--every", "5"], "goes with --trace"),
+        (["--every", "5"], "needs --trace"),
         (["--every", "0", "--trace", "t.csv"], "--every 0: must be 1 or more; "),
         (["--set", "circle.radius_mm=0"], "--set circle.radius_mm=0: must be 0.001 or more"),
         (["--set", "circle.feed_mm_per_min=1e6"], "feed_mm_per_min"),
@@ -151,7 +151,7 @@ def test_the_report_the_trace_and_the_plot_go_to_their_files(circle_test: Run, p
     for name, start in (("c.png", b"\x89PNG"), ("c.svg", b"<svg")):
         assert circle_test(profile, "-o", name, cwd=profile.parent).stderr == f"wrote {name}\n"
         assert (profile.parent / name).read_bytes().startswith(start)
-    assert "path, its error magnified" in (profile.parent / "c.svg").read_text(encoding="utf-8")
+    assert "path with magnified error" in (profile.parent / "c.svg").read_text(encoding="utf-8")
 
 
 def test_a_broken_resvg_is_said_before_the_simulation(run: Run, profile: Path) -> None:

@@ -171,7 +171,7 @@ def test_other_versions_and_a_scheduler_that_does_not_answer_are_said(
 
 
 REFUSED = {
-    "--cluster tcp://127.0.0.1:1": "--cluster: goes with --circle",
+    "--cluster tcp://127.0.0.1:1": "--cluster: needs --circle",
     "--circle --jobs 2 --cluster tcp://127.0.0.1:1": "--jobs: is the number of processes here",
     "--circle --cluster localhost": "--cluster localhost: expected the address of a Dask scheduler, as tcp://",
 }

@@ -111,7 +111,7 @@ def test_init_writes_unlike_nodes_as_groups_and_knows_a_bus_by_its_other_names(r
     # Bytes of a group are those of a node.
     assert (tool["read_bytes"], tool["write_bytes"], "read_bytes_per_axis" in tool) == (40, 24, False)
     # It speaks of the machine, and not of figures that the next edit changes.
-    assert data["description"] == "A new machine: what is assumed here stays so until somebody measures it"
+    assert data["description"] == "A new machine; assumed values are marked: measure and replace them"
 
 
 CLOSED = """
@@ -228,15 +228,21 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
             "--from nope: no shipped profile; shipped are can-fd-arm-7, can-fd-motors-8, can-motors-8, ",
         ),
         (("init", "x", "--period", "0us"), "--period 0us: must be between 0.001 and 1e+09 us"),
-        (("init", "x", "--from", "paper-1ms", "--axes", "8"), "--from: goes without --axes: a copy has the values"),
+        (
+            ("init", "x", "--from", "paper-1ms", "--axes", "8"),
+            "--from: cannot be used with --axes: a copy has the values",
+        ),
         (("init", "x", "--bus", "myrinet"), "--bus myrinet: no kind of bus; there are ieee1394, "),
         (("init", "x", "--group", "io:3"), "--group io:3: expected NAME:NODESxAXES or "),
         (("init", "x", "--group", "io:0x1"), "--group io:0x1: must have 1 node or more"),
         (("init", "x", "--group", "a:1x1", "--group", "a:2x1"), "--group a:2x1: there is a group a already"),
-        (("init", "x", "--group", "a:1x1", "--axes", "2"), "--group: goes without --nodes and --axes: each group"),
+        (
+            ("init", "x", "--group", "a:1x1", "--axes", "2"),
+            "--group: cannot be used with --nodes or --axes: each group",
+        ),
         (("init", "x", "--group", "a:1x1:4/4", "--bytes-per-axis", "2"), "--bytes-per-axis: nothing takes it"),
         (("init", "x", "--group", "a:1x0:4/0"), "group.a.write_bytes = 0: must be 1 or more"),
-        (("init", "x", "--from", "dvrk", "--group", "a:1x1"), "--from: goes without --group"),
+        (("init", "x", "--from", "dvrk", "--group", "a:1x1"), "--from: cannot be used with --group"),
         (("init", "a\nb"), r"'a\nb': no name for a profile; expected 1 to 100 printable characters"),
         (("init", "\x1b[31m"), r"'\x1b[31m': no name for a profile"),
         (("init", "missing/x"), "missing/x.toml: cannot be written: there is no folder /"),

@@ -302,9 +302,9 @@ def test_what_moves_its_margin_is_by_hand(run: Run, ring: Path) -> None:
     assert [(one["change"], one["margin_change_us"], one["note"]) for one in verdict["sensitivity"]] == [
         ("half the rate", -640.0, None),
         ("payload +4 bytes", -320.0, None),
-        ("one node more", -128.0, None),  # the second token serves it, too
+        ("one more node", -128.0, None),  # the second token serves it, too
         ("execution time +10%", 0.0, None),
-        ("one axis more per node", 0.0, "no payload follows the axes"),
+        ("one more axis per node", 0.0, "no payload follows the axes"),
     ]
     following = verdict["next_bottleneck"]
     assert (following["binding_term"], following["next_binding_term"]) == ("data", "token")
@@ -422,7 +422,7 @@ def test_doubts_without_a_bias_make_three_verdicts(
     assert said.splitlines()[0].endswith(f" {verdict.upper()}")
     assert "us, +/- 13\n" in said
     assert "\n  largest doubt   rate, +/- 13 us\n" in said  # 2 * 6.4
-    assert "\n  correction      none: how far the bus is from this timing model is not known\n" in said
+    assert "\n  correction      none: the error of this timing model is not known\n" in said
     assert "\n  rests on        no guard time, no slower execution, no other traffic\n" in said
     done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
     assert done.returncode == code

@@ -49,7 +49,7 @@ def test_circles_are_run_here_or_by_workers(busplan: Run, tmp_path: Path, monkey
         (("--x", "servo.step_us=10,20"), "x servo.step_us: no figure of capacity depends on it; add circle"),
         (("--x", "tolerance.max_contour_error_mm=1"), "no figure of capacity depends on it; add circle"),
         (("--x", "limits.max_utilisation=1"), "x limits.max_utilisation: no figure of capacity depends on it"),
-        (("--jobs", "2"), "--jobs: goes with --circle"),
+        (("--jobs", "2"), "--jobs: needs --circle"),
         (("--circle", "--jobs", "0"), "--jobs 0: must be 1 or more; "),
         (("--set", "bus.nodes=3", "--set", "bus.nodes=4"), "both set bus.nodes; give one of them"),
         (("-o", "map.pdf"), "for a PDF write .svg: a browser prints it"),

@@ -128,7 +128,7 @@ def test_what_moves_the_margin_is_asked_for(run: Run) -> None:
     (verdict,) = verdicts(run, "paper-4ms", "--sensitivity", "--period", "600us", "--set", "bus.gap_count=8")
     rows = {one["change"]: one for one in verdict["sensitivity"]}
     for change, *keys in (
-        ("one node more", "bus.nodes=3", "bus.gap_count=8"),
+        ("one more node", "bus.nodes=3", "bus.gap_count=8"),
         ("a bus reset", "bus.gap_count=63"),
         ("host time +10 us", "bus.gap_count=8", "host.transaction_us=10"),
     ):
@@ -167,7 +167,7 @@ def test_the_papers_equations_are_said_to_disagree_and_decide_nothing(run: Run) 
     done = run("capacity", "paper-4ms", "--period", "500us")
     assert done.returncode == 0
     assert "  short by        20 us, +/- 6\n" in done.stdout
-    assert "  paper model     says otherwise, 207 us needed of 250, but does not decide\n" in done.stdout
+    assert "  paper model     says otherwise: needs 207 us of 250; it does not decide\n" in done.stdout
     assert not any(verdict["models_agree"] for verdict in verdicts(run, "paper-4ms", "--period", "500us"))
 
 

@@ -143,7 +143,7 @@ def test_a_short_form_is_the_key_it_stands_for(run: Run, folder: Path) -> None:
         ),
         (
             ("check", "mine.toml", "--baseline", "b.json", "--update-baseline", *SET),
-            "--update-baseline: goes without --set node.axes=3 and --set bus.speed=S200: it records the files",
+            "--update-baseline: cannot be used with --set node.axes=3 and --set bus.speed=S200: it records the files",
         ),
         (
             ("calibrate", "mine.toml", "table-1.csv", "--apply", "--set", "node.execution.base_us=3"),

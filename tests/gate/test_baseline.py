@@ -280,12 +280,12 @@ def test_a_file_that_is_no_baseline_is_refused_with_its_name(tmp_path: Path) -> 
 
     assert refused() == "no such file; record it with --update-baseline"
     path.write_bytes(b"\xff")
-    assert refused() == "is not UTF-8, so it is no baseline; give another"
+    assert refused() == "is not UTF-8, so it is not a baseline; give another"
     path.write_text("{", encoding="utf-8")
-    assert refused().startswith("no JSON, so no baseline; remove it")
+    assert refused().startswith("not JSON, so not a baseline; remove it")
     with path.open("wb") as file:
         file.truncate(32_000_001)
-    assert refused().startswith("is larger than 32,000,000 bytes, so it is no baseline")
+    assert refused().startswith("is larger than 32,000,000 bytes, so it is not a baseline")
 
 
 @pytest.mark.parametrize(

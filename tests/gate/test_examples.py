@@ -151,11 +151,11 @@ def test_a_finding_says_the_value_the_limit_and_the_cheapest_cure() -> None:
         # 177.992 us of 2000 us; 177.992 us / 0.05 / 4000 us is 0.88996.
         ("BP103", ["8.9%", "5.0% allowed", "cheapest cure: cycle.slice_ratio = 0.89"]),
         # 14 nodes need 1911.497 us to be safe, 15 need 2097.465 us: 0.524366 of 4000 us.
-        ("BP104", ["12 to spare that are shown to fit", "13 asked for", "cheapest cure: cycle.slice_ratio = 0.53"]),
-        ("BP105", ["48 to spare that are shown to fit", "49 asked for", "cheapest cure: cycle.slice_ratio = 0.53"]),
+        ("BP104", ["room for 12 more is shown", "13 required", "cheapest cure: cycle.slice_ratio = 0.53"]),
+        ("BP105", ["room for 48 more is shown", "49 required", "cheapest cure: cycle.slice_ratio = 0.53"]),
         ("BP106", ["63 nodes", "62 of one bus", "second bus"]),
         ("BP107", ["17 hops", "16 of one bus", "bus.max_hops = 16"]),
-        ("BP108", ["516 bytes", "512 bytes", 'bus.speed = "S200" would do']),
+        ("BP108", ["516 bytes", "512 bytes", 'use bus.speed = "S200"']),
         ("BP109", ["gap count 4", "3 hops", "smallest safe one is 8", "cheapest cure: bus.gap_count = 8"]),
         # 253.187 us less 177.992 us; 13 nodes are safe at gap count 63, and 14 at that of their hops.
         ("BP110", ["gap count 63", "7 that 2 hops need", "75.2 us", "wins 1 node"]),
@@ -249,10 +249,12 @@ def test_a_check_runs_a_circle_of_so_many_steps_and_none_longer(check: Check) ->
         return [one.message for one in found.findings if one.code == "BP204"]
 
     assert not_run(text, circle_steps=10_000) == []
-    assert ["10,000 steps, more than 9,999: not run" in one for one in not_run(text, circle_steps=9_999)] == [True]
+    assert [
+        "was not run: 10,000 steps, over the limit of 9,999" in one for one in not_run(text, circle_steps=9_999)
+    ] == [True]
     # Of itself it runs ten million.
     long = text.replace("15.915", "15.92").replace("step_us = 100", "step_us = 0.1")
-    assert ["10,010,000 steps, more than 10,000,000: not run" in one for one in not_run(long)] == [True]
+    assert ["was not run: 10,010,000 steps, over the limit of 10,000,000" in one for one in not_run(long)] == [True]
 
 
 if __name__ == "__main__":

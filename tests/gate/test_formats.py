@@ -316,7 +316,7 @@ def test_markdown_has_a_verdict_for_each_profile(mixed: Answer) -> None:
     assert lines[8] == "| `p/broken.toml` | **1 error** | - | - |"
     assert lines[9].startswith("| `gone.toml` | **could not be checked**: ./gone.toml\\: no such file, and ")
     assert lines[9].endswith(" | - | - |")
-    assert lines[11] == "| place | rule | severity | what is wrong | how to mend it |"
+    assert lines[11] == "| place | rule | severity | problem | remedy |"
     assert lines[13].startswith("| `p/fails.toml:7:1` | BP110 gap-count-wasteful | warning | bus.gap\\_count\\: ")
     assert lines[13].endswith(" |  |")
     assert lines[14].endswith(" | `cycle.slice_ratio = 0.69`<br>`bus.gap_count = 7` |")

@@ -157,8 +157,8 @@ def test_limits_at_their_edge_are_held(changed: Changed, check: Check) -> None:
         assert [one.code for one in check(text).findings] == codes
     nothing = check(changed(more="\n[limits]\nmax_utilisation = 0\n"))
     assert nothing.findings[0].message.endswith(
-        "no change of gap count, slice ratio, responses, schedule and period is a cure: "
-        "limits.max_utilisation = 0 leaves no time"
+        "no change of gap count, slice ratio, responses, schedule and period helps: limits.max_utilisation = 0 "
+        "leaves no time"
     )
 
 

@@ -76,19 +76,19 @@ def test_what_cannot_be_compared_is_no_finding(run: Run, tmp_path: Path) -> None
     press(run, tmp_path)
     done = run("check", "press.toml", "--recording", str(LOG), cwd=tmp_path)
     assert done.returncode == 2
-    assert "recording.log: is no pcap or pcapng file" in done.stderr
+    assert "recording.log: is not a pcap or pcapng file" in done.stderr
     done = run("check", "press.toml", "--recording", "gone.pcap", cwd=tmp_path)
     assert (done.returncode, "gone.pcap: cannot be read" in done.stderr) == (2, True)
     done = run("check", "press.toml", "paper-4ms", "--recording", str(CAPTURE), cwd=tmp_path)
     assert done.returncode == 2
-    assert "goes with one profile, that of its machine" in done.stderr
+    assert "needs exactly one profile, that of its machine" in done.stderr
     done = run("check", "press.toml", "--quantile", "0.9", cwd=tmp_path)
-    assert (done.returncode, "--quantile: goes with --recording FILE" in done.stderr) == (2, True)
+    assert (done.returncode, "--quantile: needs --recording FILE" in done.stderr) == (2, True)
     done = run("check", "press.toml", "--recording", str(CAPTURE), "--quantile", "7", cwd=tmp_path)
     assert (done.returncode, "quantile 7: expected a share of 0.5 to 1" in done.stderr) == (2, True)
     (tmp_path / "own.pcapng").write_bytes(CAPTURE.read_bytes())
     done = run("check", "press.toml", "--recording", "own.pcapng", "-o", "own.pcapng", cwd=tmp_path)
     assert done.returncode == 2
     assert (tmp_path / "own.pcapng").read_bytes() == CAPTURE.read_bytes()
-    with pytest.raises(busplan.BusplanError, match="goes with one profile"):
+    with pytest.raises(busplan.BusplanError, match="needs exactly one profile"):
         busplan.check(["paper-4ms", "paper-dma"], recording=CAPTURE)

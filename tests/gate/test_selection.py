@@ -105,7 +105,7 @@ def test_the_settings_are_never_taken_for_a_profile(busplan: Busplan, folder: Pa
     run = busplan("check", "p/busplan.toml", cwd=folder)
     assert (run.returncode, run.stderr.splitlines()[0]) == (
         2,
-        "p/busplan.toml: has settings of `busplan check`, and no profile",
+        "p/busplan.toml: has settings of `busplan check`, but no profile",
     )
     assert busplan("check", "p/busplan.toml", "p/clean.toml", "--skip-others", cwd=folder).returncode == 0
 
@@ -136,7 +136,7 @@ def test_wrong_settings_are_told_by_their_place(busplan: Busplan, folder: Path, 
 def test_rules_that_do_not_exist_or_must_be_mended_are_refused(refused: Callable[..., str], folder: Path) -> None:
     assert "ignore BP992: no rule has a code that begins so" in refused("check", "p", "--ignore", "BP992", cwd=folder)
     words = refused("check", "p", "--ignore", "BP001", cwd=folder)
-    assert words == "ignore BP001: BP001 cannot be left out, what they find must be mended"
+    assert words == "ignore BP001: BP001 cannot be ignored; correct what they find"
 
 
 def test_known_failures_block_no_commit_and_a_further_one_does(busplan: Busplan, tmp_path: Path) -> None:
@@ -204,7 +204,7 @@ def test_an_assumption_is_told_once_a_run_and_counted(busplan: Busplan, tmp_path
     once, every = (busplan("check", ".", *more, cwd=tmp_path) for more in ((), ("--verbose",)))
     assert codes(once.stdout).count("BP112") == 1
     assert codes(every.stdout).count("BP112") == 4
-    assert "3 more alike (--verbose)" in once.stderr
+    assert "3 similar findings not shown (--verbose)" in once.stderr
     document = json.loads(busplan("check", ".", "--format", "json", cwd=tmp_path).stdout)
     assert sum(finding["code"] == "BP112" for file in document["files"] for finding in file["findings"]) == 4
 

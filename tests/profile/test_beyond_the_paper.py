@@ -114,7 +114,7 @@ def test_the_gate_names_the_limit_and_the_way_out(busplan: Run, own: Path) -> No
     assert (
         "BP101 error: cycle.period_us: a cycle start takes 147.530 us, over 124.000 us: no time is left" in done.stdout
     )
-    assert "less bus.isochronous_us, or no cycle master, leaves time" in done.stdout
+    assert "reduce bus.isochronous_us, or stop the cycle master" in done.stdout
 
 
 @pytest.mark.parametrize("line", ["cycle_master = true", "retries = 1_000_000"])

@@ -462,7 +462,7 @@ def test_a_byte_order_mark_is_stepped_over() -> None:
 def test_a_file_may_be_as_long_as_the_limit_and_no_longer() -> None:
     comment = "#" * (MAX_FILE_BYTES - len(TEXT))
     assert read(TEXT + comment).name == "test"
-    assert the_problem(f"{TEXT}{comment}#") == ("f.toml:1:1: the file is larger than 2,000,000 bytes; no profile is")
+    assert the_problem(f"{TEXT}{comment}#") == ("f.toml:1:1: the file is over 2,000,000 bytes, the limit of a profile")
 
 
 @pytest.mark.parametrize(
@@ -496,7 +496,7 @@ def test_a_dotted_key_of_many_parts_is_refused_before_it_costs_their_square() ->
         for dot in [".", " . "]:
             for parts in [21, min(10_000, 90_000 // len(part + dot))]:
                 written = dot.join([part] * parts)
-                message = "a key of more than 20 parts is no profile's"
+                message = "too many parts in a key (limit 20)"
                 assert the_problem(f"{TEXT}[t]\n{written} = 1\n") == f"f.toml:23:1: {message}"
                 assert the_problem(f"{TEXT}[{written}]\n") == f"f.toml:22:2: {message}"
 
@@ -522,7 +522,7 @@ def test_what_is_wrong_with_a_file_comes_placed() -> None:
         (".", ".: is a directory; give a file"),
         ("pipe", "pipe: is a named pipe; give a regular file"),
         ("loop", "loop: cannot be read: Too many levels of symbolic links"),
-        ("large", "large:1:1: the file is larger than 2,000,000 bytes; no profile is"),
+        ("large", "large:1:1: the file is over 2,000,000 bytes, the limit of a profile"),
     ],
 )
 def test_what_cannot_be_read_says_why(path: str, message: str) -> None:

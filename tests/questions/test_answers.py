@@ -94,7 +94,7 @@ HEADLINES = {
     "sweep": "<SweepAnswer: paper-1ms: 6 points; 6 shown to fit (standard model), 6 fit by the closed form of the "
     "paper model.>",
     "map": "<MapAnswer: paper-1ms: 57 of 195 settings are shown to fit. This design (8 axes, period 1 ms): fits.>",
-    "compare": "<CompareAnswer: paper-1ms at 1 ms: fits on IEEE 1394, its own bus; with what is assumed of other "
+    "compare": "<CompareAnswer: paper-1ms at 1 ms: fits on IEEE 1394, its own bus; with assumed values of other "
     "buses, shown to fit on none.>",
     "diff": "<DiffAnswer: paper-1ms (A) fits, paper-optimal-gap (B) fits; B is better in 16 figures: corrected margin, "
     "safe nodes, safe axes, period with enough time and 12 more.>",

@@ -112,7 +112,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "an executor of no circles": (
         lambda: busplan.map_("paper-4ms", executor=ThreadPoolExecutor()),
-        "executor: goes with circle=True",
+        "executor: needs circle=True",
     ),
     "one freedom": (
         lambda: busplan.plan("paper-4ms", free="gap_count"),
@@ -120,7 +120,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a kind beside the paper": (
         lambda: busplan.evidence("can", paper=True),
-        "kind 'can': goes without paper=True",
+        "kind 'can': cannot be used with paper=True",
     ),
     "a trace of every half step": (
         lambda: busplan.circle_test("paper-4ms").trace_csv(every=0),
@@ -179,7 +179,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a picture that there is not": (
         lambda: busplan.latency("paper-4ms").save("x.svg"),
-        "there is nothing to draw: this answer has no picture",
+        "this answer has no picture; timeline, map_",
     ),
     "a folder that there is not": (
         lambda: busplan.latency("paper-4ms").save("nowhere/x.md"),

@@ -175,7 +175,7 @@ class Bus(ABC):
         file [bytes]. Raises `BusplanError` where the file is no recording of the kind, or the kind reads none.
         """
         latencies = "; latencies in a CSV file are for busplan calibrate" if self.calibration else ""
-        raise BusplanError(f"{path}: no recording of bus.kind {self.kind} is read{latencies}")
+        raise BusplanError(f"{path}: busplan reads no recordings of bus.kind {self.kind}{latencies}")
 
     def emulator(self) -> Emulator | None:
         """Emulator of the kind; None if it writes no recordings."""

@@ -137,7 +137,7 @@ AVAILABLE: Final = Figure(
     "available time",
 )
 REQUIRED: Final = Figure(
-    "required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs", "required time", better="less"
+    "required_us", "T_need", _SLICE, "time that the whole cycle needs, N T_cs", "required time", better="less"
 )
 NONPERIODIC: Final = Figure(
     "nonperiodic_us",
@@ -159,22 +159,36 @@ REQUIRED_TIME_SLICE: Final = Figure(
     "required_time_slice_us", "T_cs,needed", _SLICE, "time slice that each node needs", "time slice T_cs, needed"
 )
 BINDING_TERM: Final = Figure(
-    "binding_term", "binding term", _SLICE, "the largest part of what the cycle needs", "largest term", sort="word"
+    "binding_term", "binding term", _SLICE, "largest term of the required time", "largest term", sort="word"
 )
 UTILISATION: Final = Figure(
     "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"
 )
 MARGIN: Final = Figure(
-    "margin_us", "margin", _CYCLE, "what is left of the slice", "margin", better="more", scale="available_us"
+    "margin_us", "margin", _CYCLE, "unused time of the slice", "margin", better="more", scale="available_us"
 )
 MAX_NODES: Final = Figure(
-    "max_nodes", "N_max", _CYCLE, "most nodes that fit the period", "most nodes", "nodes", "count", better="more"
+    "max_nodes",
+    "N_max",
+    _CYCLE,
+    "largest number of nodes that fit the period",
+    "most nodes",
+    "nodes",
+    "count",
+    better="more",
 )
 MAX_AXES: Final = Figure(
-    "max_axes", "axes_max", _CYCLE, "axes of the most nodes that fit", "most axes", "axes", "count", better="more"
+    "max_axes",
+    "axes_max",
+    _CYCLE,
+    "axes of the largest number of nodes that fits",
+    "most axes",
+    "axes",
+    "count",
+    better="more",
 )
 LIMITED_BY: Final = Figure(
-    "limited_by", "limit", _CYCLE, "what keeps the most nodes from being more", "limited by", sort="word"
+    "limited_by", "limit", _CYCLE, "limit that stops the number of nodes", "limited by", sort="word"
 )
 MIN_PERIOD: Final = Figure(
     "min_period_us",
@@ -215,7 +229,7 @@ MARGIN_CORRECTED: Final = Figure(
     "margin_corrected_us",
     "margin_c",
     _CERTAINTY,
-    "what is left of the slice, less the bias",
+    "unused time of the slice, less the bias",
     "corrected margin",
     better="more",
     scale="available_us",
@@ -232,14 +246,14 @@ SAFE_REQUIRED: Final = Figure(
     "T_safe",
     _CERTAINTY,
     "slice in which the cycle is shown to fit, reserve included",
-    "needed to be shown to fit",
+    "slice needed to show that it fits",
     better="less",
 )
 SAFE_NODES: Final = Figure(
     "safe_nodes",
     "N_safe",
     _CERTAINTY,
-    "most nodes that are shown to fit, on a bus set safely for them",
+    "largest number of nodes that are shown to fit, on a bus set safely for them",
     "safe nodes",
     "nodes",
     "count",
@@ -252,7 +266,7 @@ SAFE_LIMITED_BY: Final = Figure(
     "safe_limited_by",
     "limit_safe",
     _CERTAINTY,
-    "what keeps the safe nodes from being more",
+    "limit that stops the number of safe nodes",
     "safe nodes limited by",
     sort="word",
 )

@@ -25,7 +25,7 @@ class TimingModel(NamedTuple):
 
     name: str
     meaning: str
-    error: str = "how far the bus is from this timing model is not known"
+    error: str = "the error of this timing model is not known"
     """Error of the model in words, where its bias is not known."""
 
 
@@ -300,7 +300,7 @@ class Starter(NamedTuple):
     """Other buses of the kind by name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
     rate: str = ""
     """Key of [bus] with a bit rate that a user is asked for; empty where there is only one."""
-    base: str = "what a node does in each cycle"
+    base: str = "time of a node's work in each cycle"
     """Meaning of execution.base_us."""
     table: str = ""
     """Keys of a published execution time, in place of a guess."""
@@ -314,9 +314,9 @@ class Starter(NamedTuple):
             self.table
             or f"""\
 kind = "linear"
-grade = "assumed"          # between nothing and twice its value
+grade = "assumed"          # between 0 and twice its value
 base_us = 20               # assumed: {self.base}
-per_byte_us = 0.1          # assumed: what each byte adds
+per_byte_us = 0.1          # assumed: time per byte
 """
         )
 
@@ -473,7 +473,7 @@ def period_limit(periods: Periods) -> Limit:
         lambda network: periods.refusal(network.period_us),
         lambda network: choose(periods.shortest_us(network.period_us) > network.period_us, 1, 0),
         lambda _network: 0,
-        way_out="a period that the bus allows will do",
+        way_out="choose a period that the bus allows",
         role="period",
         has_rule=True,
     )
@@ -488,7 +488,10 @@ def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def nodes_limit(nodes: str, most: Callable[[], float], bus: str, *, of: str = "of a", has_rule: bool = False) -> Limit:
     """Limit on the nodes of a bus, by the names of both; `of` stands between the number and the bus."""
-    over, way_out = f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}", f"a second {bus} has {{most:g}} more"
+    over, way_out = (
+        f"{{value:.0f}} {nodes} are over the {{most:.0f}} {of} {bus}",
+        f"a second {bus} has room for {{most:g}} more",
+    )
     return ExactLimit("nodes", over, lambda network: network.nodes, lambda _: most(), way_out, has_rule=has_rule)
 
 
@@ -508,7 +511,7 @@ def busy_words(group: Group, network: Network) -> str:
     doubt_us = COVERAGE * _busy_doubt_us(group)
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
     busy, most = told_apart(_busy_us(group), (network.period_us * group.every))
-    return f"a node executes for {busy}{either_way} us of {most} us"
+    return f"a node's execution takes {busy}{either_way} us of its {most} us"
 
 
 def _busy_us(group: Group) -> Number:
@@ -539,7 +542,7 @@ class BusyNode(ShareOfPeriod):
 
     key = NODE
     label = "the execution time of a node"
-    way_out = "a longer period or a faster node would do"
+    way_out = "use a longer period or a faster node"
 
     def value(self, network: Network) -> Number:
         """The middle of the bounds of the busiest node [us]."""

@@ -39,8 +39,8 @@ def capacity_command(
         typer.Option(
             "--sensitivity",
             help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop "
-            "or one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. "
-            "CSV has these rows instead, and a picture their bars.",
+            "or one more retry, 10 us more host time, or a bus reset, one at a time; and what binds next. "
+            "CSV then has these rows, and a picture their bars.",
         ),
     ] = False,
 ) -> "Report":
@@ -48,7 +48,7 @@ def capacity_command(
 
     It prints a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on this
     bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
-    change. --all adds every figure behind it. Times are in us. Exits 0 with any verdict.
+    change. --all adds every figure behind it. Times are in us. Exits 0 whatever the verdict.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
@@ -89,12 +89,13 @@ def latency_command(
     ] = None,
     timing_model: TimingModelOption = "both",
 ) -> "Answer":
-    """Show how long data takes to arrive, phase by phase, under each timing model.
+    """Show the delay of data, phase by phase, under each timing model.
 
     On IEEE 1394 it times one read and one write of the farthest node, or, in the broadcast schedule, the data and the
     commands of all nodes; on CAN the worst-case response time of every message, and a loop over feedback and commands;
     on EtherCAT a command, feedback, and a loop over both; on SERCOS feedback and commands of all nodes; on a polled bus
-    the whole cycle. Times are in us, sizes in bytes; each phase has its equation or source. Exits 0 with any figures.
+    the whole cycle. Times are in us, sizes in bytes; each phase has its equation or source. Exits 0 whatever the
+    figures.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
@@ -124,11 +125,12 @@ def circle_test_command(
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 
     The test has three parts. The bus: a cycle that does not fit its period fails before any simulation. Stability: a
-    loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: without any,
-    the circle is not judged, nor below 0.1 um, where no error source of the profile matters. Errors are in um in the
-    table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4, and circle.path = "iso230-4" measures
-    them on a whole turn. A picture shows the magnified polar error, the error over time and the ranked error sources,
-    with tolerances. Exits 0 when the test passes or the circle is not judged, and 1 when it fails.
+    loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: a circle
+    without tolerances is not judged, nor is one below 0.1 um, where no error source of the profile matters. Errors are
+    in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4, and circle.path =
+    "iso230-4" measures them on a whole turn. A picture shows the magnified polar error, the error over time and the
+    ranked error sources, with tolerances. Exits 0 when the test passes or the circle is not judged, and 1 when it
+    fails.
 
     Example: busplan circle-test paper-4ms --contributions
     """
@@ -210,7 +212,7 @@ def timeline_command(
     The events are everything that takes time on the wire, in its order, the time for non-periodic data, and the rest of
     the slice. Without that rest they add up to the required time of `busplan capacity`. A cycle that overruns its slice
     is shown whole, and says so. Every node is computed with the hops of the farthest, unless the profile says
-    otherwise. Times are in us. Exits 0 with any verdict.
+    otherwise. Times are in us. Exits 0 whatever the verdict.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
@@ -264,7 +266,7 @@ def explain_command(
 
     Each step names its equation. Each input has its source and its grade: published, derived, recalled, measured,
     calibrated or assumed, or "given" where the profile sets it. The steps are those of the computation itself. What is
-    searched for, compared or simulated has no equation: capacity and circle-test show it. Exits 0 with any figures.
+    searched for, compared or simulated has no equation: capacity and circle-test show it. Exits 0 whatever the figures.
 
     Example: busplan explain paper-4ms required_us
     """
@@ -311,7 +313,7 @@ def report_command(
 
     The first screen has the verdict and the map; every other answer is behind a fold, with its command, and is printed
     whole. Times are in us, contour errors in um. Several profiles are compared at the top. The HTML needs no network
-    and no script. Exits 0 with any verdict.
+    and no script. Exits 0 whatever the verdict.
 
     Example: busplan report paper-4ms paper-1ms -o report.html
     """

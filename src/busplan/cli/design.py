@@ -94,18 +94,16 @@ def plan_command(
             "-o",
             metavar="FILE",
             help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
-            "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
+            "name, as NEW.toml: write a copy of PROFILE with the recommended values, named after the file; - "
             "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
             "output]",
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
-    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Let -o NEW.toml overwrite an existing file.")] = False,
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
-    """Tell what to set for a number of nodes or axes: gap count, slice ratio, period, or several of them.
+    """Find the settings for a number of nodes or axes: gap count, slice ratio, period, or several of them.
 
     It changes one thing at a time, the cheapest first and as little as possible, until the goal is shown to fit with
     its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9;
@@ -171,7 +169,7 @@ def _check_options(
     if new == STANDARD_OUTPUT and format_ not in (None, "table"):
         problems.append(f"--format {format_} and -o -: standard output takes one document; give -o a file")
     if force and new is None:
-        problems.append("--force: goes with -o NEW.toml")
+        problems.append("--force: needs -o NEW.toml")
     if problems:
         raise BusplanError(*problems)
 
@@ -244,7 +242,9 @@ def calibrate_command(
     ] = None,
     timing_model: Annotated[
         str | None,
-        typer.Option(metavar="MODEL", help="Timing model that computes the packets.  [default: the one that decides]"),
+        typer.Option(
+            metavar="MODEL", help="Timing model for the time of the packets.  [default: the one that decides]"
+        ),
     ] = None,
     apply: Annotated[
         bool,
@@ -263,9 +263,8 @@ def calibrate_command(
 
     T_exec is the latency less the time of its packets by the timing model, equation (3); each payload has the median.
     Where the bench differs from the profile, give its values: --set bus.nodes=2 --set bus.gap_count=63. Of three or
-    more measurements of a payload, those far from their median are named by their line and left out; slow ones are in
-    worst_extra_us.
-    Times are in us. Exits 0 with any figures.
+    more measurements of a payload, those far from their median are named by their line and left out; slow ones give
+    worst_extra_us. Times are in us. Exits 0 whatever the figures.
 
     Example: busplan calibrate paper-two-node table-1.csv
     """
@@ -327,8 +326,7 @@ def measured_command(
         float,
         typer.Option(
             metavar="SHARE",
-            help="Share of the cycles that jitter and times are to hold for, 0.5..1 [1].  [default: 1, the worst "
-            "recorded]",
+            help="Share of the cycles that jitter and times must cover, 0.5..1 [1].  [default: 1, the worst recorded]",
             show_default=False,
         ),
     ] = 1.0,
@@ -344,12 +342,12 @@ def measured_command(
         ),
     ] = False,
 ) -> "Report":
-    """Show what the machine does by a recording of its bus, beside what was planned.
+    """Compare a recording of the machine's bus with its plan.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
     within the plan: jitter, times, load and bytes at most as planned, or beyond it by no more than U. A figure that the
-    recording does not show has a reason. Of EtherCAT record all packets of the master's port, both ways. Times are in
-    us. `busplan manual measured` says how each figure is measured. Exits 0 with any figures.
+    recording cannot show has the reason instead. On EtherCAT record all packets of the master's port, both ways. Times
+    are in us. `busplan manual measured` says how each figure is measured. Exits 0 whatever the figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """
@@ -372,7 +370,8 @@ def emulate_command(
         int | None, typer.Option(metavar="N", help="Length of the recording, in cycles.  [default: 1000]")
     ] = None,
     duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="The same as a time with its unit.  [default: --cycles]")
+        str | None,
+        typer.Option(metavar="TIME", help="Length of the recording as a time with its unit.  [default: --cycles]"),
     ] = None,
     fault: Annotated[
         list[str] | None,
@@ -382,14 +381,16 @@ def emulate_command(
             "how late, as jitter=50us.  [default: 5 times, a share of the period]",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of jitter and data: the same gives the same bytes.")] = 1,
+    seed: Annotated[
+        int, typer.Option(metavar="N", help="Seed of jitter and data; the same seed gives the same bytes.")
+    ] = 1,
     output: Annotated[Path | None, output_option("Write the recording to FILE.pcapng, FILE.log or .candump")] = None,
 ) -> None:
-    """Write the recording that the planned machine would give, so that software is tried before the machine exists.
+    """Write the recording that the planned machine would give, to try software before the machine exists.
 
-    EtherCAT gives a capture of the master's port, pcapng, and CAN a log of candump. The file says that it is synthetic:
-    nothing is measured by it. Faults of EtherCAT: missing-cycle, lost-frame, wrong-working-counter, jitter. Faults of
-    CAN: missing-cycle, missing-pdo, double-pdo, late-command, jitter, error-frame. Exits 0 when it is written.
+    EtherCAT gives a capture of the master's port, pcapng, and CAN a log of candump. The file says that it is synthetic,
+    not a measurement. Faults of EtherCAT: missing-cycle, lost-frame, wrong-working-counter, jitter. Faults of CAN:
+    missing-cycle, missing-pdo, double-pdo, late-command, jitter, error-frame. Exits 0 when it is written.
 
     Example: busplan emulate can-servo-8 --fault late-command -o log.candump
     """
@@ -450,8 +451,8 @@ def _crew(jobs: int | None, *, circle: bool) -> "Iterator[Executor | None]":
 @command("For a key on an axis of the map, it moves the mark.", period="one", is_drawn=True)
 def map_command(
     call: Call,
-    x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
-    y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
+    x: Annotated[str | None, _direction("--x", default="axes around the largest number that fits")] = None,
+    y: Annotated[str | None, _direction("--y", default="cycle.period_us around the smallest that fits [us]")] = None,
     circle: Annotated[
         bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
     ] = False,
@@ -463,7 +464,7 @@ def map_command(
     unsafe gap count; with --circle also whether the circle fails. A table says what limits each region: time with its
     largest term, or a limit of the bus. The profile's own cell is marked. Values that cannot be combined are blank.
     With --x alone, the free time and its uncertainty are drawn over that key.
-    Exits 0 with any verdict.
+    Exits 0 whatever the verdict.
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
     """
@@ -490,8 +491,8 @@ def explore_command(
     """Write a page with sliders that shows what a change does: to the period, the nodes, the payload.
 
     Every setting is computed now, and the page shows its card and its place on the map: one file to open in a browser
-    or to send, without a server. Other forms show the map of this design. Up to 32 values each, 5,000 settings in
-    all. Exits 0 with any verdict.
+    or to send, without a server. Other forms show the map of this design. A key has up to 32 values; 5,000 settings in
+    all. Exits 0 whatever the verdict.
 
     Example: busplan explore gantry-24 -o gantry-24.html
     """
@@ -520,13 +521,13 @@ def compare_command(
 ) -> "Answer":
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
-    The kinds are the paper's, IEEE 1394, CAN, SERCOS and polled buses (PROFIBUS, WorldFIP), and
-    EtherCAT; a new profile of a polled bus is PROFIBUS.
+    The kinds are those of the paper (IEEE 1394, CAN, SERCOS, and the polled buses PROFIBUS and WorldFIP) and EtherCAT;
+    a new profile of a polled bus is PROFIBUS.
 
     The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
     On its own kind the profile stays as it is. On another kind it gets the bus of a new profile, which is assumed; keys
     that only its own kind has are left out, and named. The smallest period [us] is the one at which this machine is
-    shown to fit; the most axes are those at the profile's period. Exits 0 with any verdict.
+    shown to fit; the most axes are those at the profile's period. Exits 0 whatever the verdict.
 
     Example: busplan compare gantry-24
     """
@@ -561,7 +562,7 @@ def import_command(
         str | None,
         typer.Option(
             metavar="TIME",
-            help="Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so "
+            help="Period of the CAN messages that have none in any file, with its unit, as 100ms. It is assumed, so "
             "the plan is not shown to fit.  [default: such messages are left out]",
         ),
     ] = None,
@@ -569,7 +570,7 @@ def import_command(
         str | None,
         typer.Option(
             metavar="NODES",
-            help="Nodes that one EDS stands for: their number, as 8, from node-ID 1 on, or their node-IDs, as "
+            help="Nodes described by one EDS: their number, as 8 for node-IDs 1 to 8, or their node-IDs, as "
             "1-8,11.  [default: one]",
         ),
     ] = None,
@@ -577,11 +578,11 @@ def import_command(
         float | None,
         typer.Option(
             metavar="RATE",
-            help="Bit rate of a CAN bus, before that of any file [kbit/s].  [default: that of a file, or that "
-            "which frames of a log directly after each other show]",
+            help="Bit rate of a CAN bus, which overrides that of any file [kbit/s].  [default: that of a file, or "
+            "that of back-to-back frames in a log]",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite an existing file.")] = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
@@ -591,7 +592,7 @@ def import_command(
     `busplan manual import` lists what each format gives.
 
     The profile goes to standard output or to the file of -o; an existing file stays, unless --force is given. Exits 0
-    when the profile is written, with any verdict.
+    when the profile is written, whatever the verdict.
 
     Example: busplan import machine.xml slaves.txt -o machine.toml
     """

@@ -60,7 +60,8 @@ class _Selection:
     ignore: Annotated[
         str | None,
         typer.Option(
-            metavar="CODES", help="Rules that do not count, as BP112; the longest beginning decides.  [default: none]"
+            metavar="CODES",
+            help="Rules that do not count, as BP112; the longest beginning that matches decides.  [default: none]",
         ),
     ] = None
     show_suppressed: Annotated[
@@ -98,7 +99,8 @@ class _Circle:
         typer.Option(
             metavar="N",
             min=1,
-            help="Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of "
+            help="Largest number of simulated steps per axis of a circle; a longer circle is not run, and BP204 "
+            "warns of "
             "it.  [default: 10000000]",
         ),
     ] = None
@@ -118,7 +120,7 @@ class _Baseline:
     baseline: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="File with recorded axes and margins, which no profile may lose.  [default: none]"
+            metavar="FILE", help="File of recorded axes and margins, below which no profile may fall.  [default: none]"
         ),
     ] = None
     update_baseline: Annotated[
@@ -126,15 +128,15 @@ class _Baseline:
         typer.Option(
             "--update-baseline",
             help="Record the present axes, margins and findings in the --baseline file, and drop records without "
-            "a profile. Findings that are recorded count no more. Exits 0 when it is written.",
+            "a profile. Recorded findings no longer count. Exits 0 when it is written.",
         ),
     ] = False
     pass_on_unmatched: Annotated[
         bool,
         typer.Option(
             "--pass-on-unmatched",
-            help="Let profiles without a record in the --baseline file pass, and records without a profile; "
-            "without it they exit 2.",
+            help="Accept profiles without a record in the --baseline file, and records without a profile; "
+            "otherwise they exit 2.",
         ),
     ] = False
 
@@ -144,9 +146,11 @@ class _Baseline:
         of_baseline = {"--update-baseline": self.update_baseline, "--pass-on-unmatched": self.pass_on_unmatched}
         require_company("--baseline FILE", of_baseline, is_given=path)
         if self.update_baseline and self.pass_on_unmatched:
-            raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
+            raise BusplanError("--pass-on-unmatched: cannot be used with --update-baseline")
         if self.update_baseline and changes.entries:
-            raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
+            raise BusplanError(
+                f"--update-baseline: cannot be used with {changes.words}: it records the files as they are"
+            )
         if self.update_baseline and path is not None:
             require_changeable(path)
         return path
@@ -160,15 +164,15 @@ class _Recording:
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Recording of the machine of the one profile, as `busplan measured` takes it: what is outside "
-            "the plan fails the check.  [default: none]",
+            help="Recording of the machine of the only profile, as for `busplan measured`; a figure outside the "
+            "plan fails the check.  [default: none]",
         ),
     ] = None
     quantile: Annotated[
         float,
         typer.Option(
             metavar="SHARE",
-            help="Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1].  [default: 1]",
+            help="Share of the cycles of --recording that jitter and times must cover, 0.5..1 [1].  [default: 1]",
             show_default=False,
         ),
     ] = 1.0
@@ -395,18 +399,18 @@ def diff_command(
         float | None,
         typer.Option(
             metavar="PERCENT",
-            help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
+            help="With --fail-on-regression: largest accepted loss of a number against A [%].  [default: 0]",
         ),
     ] = None,
 ) -> "Answer | Fails":
     """Tell what changed between two profiles, and what that does to every figure.
 
-    A sentence has both verdicts and says in what B is better or worse. Below it stand the keys whose values differ,
-    defaults applied, and the figures of capacity that differ, with B - A and its share of A. Settings and what
+    A sentence gives both verdicts and the figures in which B is better or worse. Below are the keys whose values
+    differ, defaults applied, and the figures of capacity that differ, with B - A and its share of A. Settings and what
     describes them (period, nodes, gap count, time available, a single term) are neither better nor worse. JSON and CSV
-    list equal figures, too. Times are in us. Markdown is for a pull request. Exits 0 with any figures; with
+    list equal figures, too. Times are in us. Markdown is for a pull request. Exits 0 whatever the figures; with
     --fail-on-regression 1 when any figure is worse, under any timing model. --timing-model leaves figures out, but
-    never the verdict. Which key cost what is told by check, against its baseline.
+    never the verdict. `busplan check` with a baseline tells which key cost what.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
@@ -437,7 +441,7 @@ def rule_command(
         ),
     ] = None,
 ) -> "Report":
-    """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
+    """Explain a rule of `busplan check`: the problem, why it matters, and the remedy.
 
     Without a code it lists all rules with their severity. Exits 0.
 

@@ -56,8 +56,8 @@ def init_command(
         list[str] | None,
         typer.Option(
             metavar="NAME:NODESxAXES[:READ/WRITE]",
-            help="Nodes of the same kind: the axes of one node and, if not by --bytes-per-axis, the bytes that "
-            "it sends and receives; repeated, instead of --nodes and --axes.  [default: one group]",
+            help="Nodes of the same kind: the axes of one node, and the bytes that it sends and receives, else by "
+            "--bytes-per-axis. May be given several times; replaces --nodes and --axes.  [default: one group]",
         ),
     ] = None,
     period: Annotated[
@@ -75,8 +75,8 @@ def init_command(
         str | None,
         typer.Option(
             metavar="HOST",
-            help="Host of an EtherCAT bus, from which its own time is assumed: hardware, tuned, real-time or "
-            "stock; other kinds have no choice of hosts.  [default: tuned]",
+            help="Host of an EtherCAT bus, which sets the assumed time of the master: hardware, tuned, real-time "
+            "or stock. Only for EtherCAT.  [default: tuned]",
         ),
     ] = None,
     bit_rate: Annotated[
@@ -91,14 +91,14 @@ def init_command(
             autocompletion=complete_profile,
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is already there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write a commented profile of your machine, and say whether it fits.
 
     Values that are not known yet are assumed, graded so, and have a comment on how to find them. In a terminal the
     command asks for missing values; otherwise it takes the defaults and names them. With --from it copies a shipped
-    profile under the new name. Exits 0 when the file is written, whatever the verdict is; a file that is already there
-    stays as it is, unless --force is given. To start from a machine's own files, such as an ENI, use `busplan import`.
+    profile under the new name. Exits 0 when the file is written, whatever the verdict is; an existing file stays,
+    unless --force is given. To start from a machine's own files, such as an ENI, use `busplan import`.
 
     Nodes that differ are groups: --group dual:4x2 --group io:3x0:32/8 are four nodes of two axes each and three without
     axes, which send 32 bytes and receive 8.
@@ -130,7 +130,7 @@ def init_command(
     else:
         if values.given:
             options = " and ".join(values.given)
-            raise BusplanError(f"--from: goes without {options}: a copy has the values of its profile")
+            raise BusplanError(f"--from: cannot be used with {options}: a copy has the values of its profile")
         text = starter_text(source, name=path.stem)
     write_file(path, text.encode(), overwrite=force)
     defaults = [f"not given, so taken: {' '.join(values.taken)}"] if values.taken else []
@@ -235,7 +235,7 @@ def _machine(kind: str, values: _Values) -> "Machine":
 
     starter, groups = kind_named(kind).starter, _groups(values.given.get("--group", []))
     if groups and values.given.keys() & {"--nodes", "--axes"}:
-        raise BusplanError("--group: goes without --nodes and --axes: each group says its own")
+        raise BusplanError("--group: cannot be used with --nodes or --axes: each group says its own")
     if not groups:
         nodes = values.number("--nodes", "Nodes, the host not counted", _NODES)
         axes = values.number("--axes", "Axes of all nodes", _AXES_PER_NODE * nodes)
@@ -255,7 +255,7 @@ def _machine(kind: str, values: _Values) -> "Machine":
     if host is not None and host not in starter.hosts:
         kinds = listed([name for name in kind_names() if kind_named(name).starter.hosts], "or")
         known = f"there are {', '.join(starter.hosts)}"
-        raise BusplanError(f"--host {host}: {known if starter.hosts else f'goes with --bus {kinds}, not with {kind}'}")
+        raise BusplanError(f"--host {host}: {known if starter.hosts else f'only for --bus {kinds}, not for {kind}'}")
     return Machine(groups, period_us, size, host, rate=_rate(kind, values))
 
 

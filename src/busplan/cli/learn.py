@@ -106,7 +106,7 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
     columns = (
         *(TableColumn(heading, kind="words") for heading in ("profile", "bus")),
         *(TableColumn(heading) for heading in ("nodes", "axes", "period")),
-        TableColumn("what it is", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
+        TableColumn("description", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
     )
     table = Table(columns, tuple(rows), Sentence(("Shipped profiles",)))
     return Report(Sentence(("Shipped profiles",)), (table,), document("profiles", profiles=records), records)
@@ -123,7 +123,7 @@ def evidence_command(
 
     Each figure has its grade, the way it is computed, and the residual, computed less published, also in percent. A
     kind without such a figure says so, here and in its verdicts. `busplan paper` shows the part of the paper. Exits 0
-    with any residuals.
+    whatever the residuals.
 
     Example: busplan evidence ieee1394
     """
@@ -138,7 +138,7 @@ def paper_command() -> "Answer":
     The figures are those of Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of
     equation (10), Figs. 9 and 10 and the comparison with SERCOS, each with its grade and the way it is computed. The
     residual is computed less published, also in percent. The servo values of the circles were calibrated to these very
-    figures. This is the paper's part of `busplan evidence ieee1394`. Exits 0 with any residuals.
+    figures. This is the paper's part of `busplan evidence ieee1394`. Exits 0 whatever the residuals.
 
     Example: busplan paper --format csv
     """

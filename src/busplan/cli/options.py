@@ -192,7 +192,7 @@ def require_company(company: str, options: Mapping[str, object], *, is_given: ob
     """
     for name, value in options.items():
         if value and not is_given:
-            raise BusplanError(f"{name}: goes with {company}")
+            raise BusplanError(f"{name}: needs {company}")
 
 
 VALUES_HELP: Final = (

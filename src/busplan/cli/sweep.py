@@ -84,7 +84,7 @@ class _Circle:
         return executor(min(self.jobs or available_processors(), points))
 
 
-@command("A key that varies takes none.", answers=False)
+@command("Not for a key of --vary.", answers=False)
 def sweep_command(
     call: Call,
     circle: _Circle,
@@ -113,7 +113,8 @@ def sweep_command(
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
     Each row has the figures of `busplan capacity` for one point, of a million at most: a table for pandas, polars or
-    duckdb, which sort, group and draw it. Ctrl-C, SIGTERM and SIGHUP leave FILE as it was. Exits 0 with any verdict.
+    duckdb, which sort, group and draw it. Ctrl-C, SIGTERM and SIGHUP leave FILE as it was. Exits 0 whatever the
+    verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 -o nodes.csv
     """

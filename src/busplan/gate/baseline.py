@@ -151,7 +151,7 @@ class Baseline(NamedTuple):
             if names
         )
         words = ", ".join(counts)
-        cure = "--update-baseline adds or drops these records, --pass-on-unmatched lets them pass"
+        cure = "use --update-baseline to add or drop these records, or --pass-on-unmatched to accept them"
         return f"{self}: {words}; {cure}" if words else ""
 
 
@@ -165,11 +165,13 @@ def load_baseline(path: Path) -> Baseline:
     # Absolute, because "-" would mean standard input.
     content = read_bytes(path.absolute(), name=str(path), limit=MAX_BASELINE_BYTES)
     if len(content) > MAX_BASELINE_BYTES:
-        raise BusplanError(f"{path}: is larger than {MAX_BASELINE_BYTES:,} bytes, so it is no baseline; give another")
+        raise BusplanError(
+            f"{path}: is larger than {MAX_BASELINE_BYTES:,} bytes, so it is not a baseline; give another"
+        )
     try:
         text = content.decode()
     except UnicodeDecodeError:
-        raise BusplanError(f"{path}: is not UTF-8, so it is no baseline; give another") from None
+        raise BusplanError(f"{path}: is not UTF-8, so it is not a baseline; give another") from None
     return read_baseline(text, name=str(path))._replace(path=path)
 
 
@@ -178,7 +180,7 @@ def read_baseline(text: str, *, name: str) -> Baseline:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
-        raise BusplanError(f"{name}: no JSON, so no baseline; {_REMEDY}") from None
+        raise BusplanError(f"{name}: not JSON, so not a baseline; {_REMEDY}") from None
     if not isinstance(document, dict) or document.get("command") != "baseline" or document.get("schema") != _SCHEMA:
         raise BusplanError(f"{name}: no baseline of this version; {_REMEDY}")
     try:

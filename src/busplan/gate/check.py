@@ -135,7 +135,7 @@ def check(
     recorded = None if baseline is None else _recorded(baseline)
     collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
     if recording is not None and len(collection.sources) + len(profiles) != 1:
-        raise BusplanError(f"recording {os.fspath(recording)}: goes with one profile, that of its machine")
+        raise BusplanError(f"recording {os.fspath(recording)}: needs exactly one profile, that of its machine")
     options: dict[str, Any] = {
         "recording": None if recording is None else Recording(recording, quantile),
         "with_circle": circle,

@@ -135,7 +135,7 @@ class Subject:
     def _cure(self) -> Mending:
         mending = cure(self.network)
         if mending.changes is None:
-            return Mending(f"no change of {listed(changeable(self.network), 'and')} is a cure: {mending.why}")
+            return Mending(f"no change of {listed(changeable(self.network), 'and')} helps: {mending.why}")
         lines = tuple(f"{key} = {short_text(value)}" for key, value in mending.changes.items())
         return Mending("the period must change" if PERIOD in mending.changes else "", lines)
 
@@ -160,7 +160,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
 
     steps = path_steps(network)
     if steps > most_steps:
-        words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
+        words = f"the circle was not run: {steps:,} steps, over the limit of {most_steps:,}"
         yield LONG_CIRCLE, RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
     result = run_circles(network).results[0]

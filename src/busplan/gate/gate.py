@@ -96,7 +96,7 @@ def suppress(
             if code not in all_rules():
                 message = f"{code or 'nothing'} is not the code of a rule"
             elif code in NEVER_SUPPRESSED:
-                message = f"{code} cannot be suppressed, it must be mended"
+                message = f"{code} cannot be suppressed; correct the profile"
             elif not hit and code in ran:
                 message = f"{code} has nothing to suppress on line {comment.of_line}"
             else:

@@ -146,7 +146,7 @@ def summary_sentence(report: CheckReport) -> Sentence:
         (failed, "{} could not be checked"),
         (counts.circles_not_run, f"{{}} {nouns(counts.circles_not_run, 'circle test')} not run"),
         (counts.suppressed, f"{{}} {nouns(counts.suppressed, 'finding')} suppressed"),
-        (len(report.located) - len(report.told), "{} more alike (--verbose)"),
+        (len(report.located) - len(report.told), "{} similar findings not shown (--verbose)"),
         (report.others, f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"),
     )
     return joined(summary, *(sentence(words, count_value(number)) for number, words in parts if number), by="; ")
@@ -466,7 +466,7 @@ def _clean(text: str) -> str:
 
 
 _PROFILES: Final = ("profile", "result", "verdict", "corrected margin, us")
-_FINDINGS: Final = ("place", "rule", "severity", "what is wrong", "how to mend it")
+_FINDINGS: Final = ("place", "rule", "severity", "problem", "remedy")
 
 
 def _fit_record(fit: Fit) -> dict[str, Any]:

@@ -93,7 +93,7 @@ def _too_little_room(subject: RuleSubject, what: str) -> Iterator[RuleProblem]:
 def _spare(counts: Any, spare: int, least: int) -> str:
     """Number of nodes or axes to spare, and the limit that binds."""
     group = f"group {counts.name}: " if counts.name else ""
-    words = f"{max(spare, 0)} to spare that are shown to fit, {least} asked for"
+    words = f"room for {max(spare, 0)} more is shown, {least} required"
     return f"{group}{words}; limited by {counts.safe_limited_by}"
 
 
@@ -178,7 +178,7 @@ def cycle_rules(kind: str) -> tuple[Rule, ...]:
 
 _COLUMNS: Final = (
     *(TableColumn(heading, kind="words") for heading in ("code", "rule", "severity")),
-    TableColumn("what is wrong", kind="words", wraps=True),
+    TableColumn("problem", kind="words", wraps=True),
 )
 
 

@@ -65,7 +65,7 @@ def checked_codes(starts: Iterable[str], *, name: str) -> tuple[str, ...]:
             hint = "; ".join(filter(None, (did_you_mean(start, all_rules()), "`busplan rule` lists them")))
             raise BusplanError(f"{name} {start or repr(start)}: no rule has a code that begins so; {hint}")
         if all(code in NEVER_SUPPRESSED for code in rules):
-            raise BusplanError(f"{name} {start}: {', '.join(rules)} cannot be left out, what they find must be mended")
+            raise BusplanError(f"{name} {start}: {', '.join(rules)} cannot be ignored; correct what they find")
     return codes
 
 

@@ -144,7 +144,7 @@ class Document:
         # A key is on one line, so dots are counted first: much faster than the search.
         may_be_long = any(line.count(".") >= _MAX_KEY_PARTS for line in self.text.split("\n"))
         if may_be_long and (long_key := re.search(_LONG_KEY, self.text)):
-            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
+            raise self.syntax_error(long_key.start(1), f"too many parts in a key (limit {_MAX_KEY_PARTS})")
         # Lines end in LF here. What is left of CR CR LF is no line end, but tomllib would take it for one.
         if "\r\n" in self.text:
             raise self.syntax_error(self.text.index("\r\n"), "not valid TOML: illegal character '\\r'")
@@ -215,13 +215,13 @@ def _machine_file(content: bytes, name: str) -> PlacedError | None:
     formats = matching(content)
     if len(formats) != 1:
         return None
-    message = f"is {formats[0].short}, and no profile: `busplan import {name}` makes one of it"
+    message = f"is {formats[0].short}, not a profile; convert it with `busplan import {name}`"
     return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 
 def too_large(name: str) -> PlacedError:
     """Error for a file that is too large for a profile."""
-    message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; no profile is"
+    message = f"the file is over {MAX_FILE_BYTES:,} bytes, the limit of a profile"
     return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 

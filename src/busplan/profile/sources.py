@@ -249,7 +249,7 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: b
         elif path.is_dir():
             yield from _below(path, skipped)
         elif path.name == SETTINGS_FILE and not skip_others:
-            yield ProfileSource(path, name, f"{name}: has settings of `busplan check`, and no profile")
+            yield ProfileSource(path, name, f"{name}: has settings of `busplan check`, but no profile")
         elif skip_others and path.is_file() and (path.name == SETTINGS_FILE or not claims(path)):
             skipped.append(_name(path))
         else:

@@ -29,7 +29,7 @@ _COMMENTS_AT: Final = 27
 _MACHINE: Final = """\
 schema_version = 1
 name = {name}
-description = "A new machine: what is assumed here stays so until somebody measures it"
+description = "A new machine; assumed values are marked: measure and replace them"
 
 {bus}
 {count}

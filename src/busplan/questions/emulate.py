@@ -59,7 +59,7 @@ class EmulateAnswer(Answer):
         """Contents of the recording."""
         name = self.profile.name
         length = f"{plural(self.cycles, 'cycle')}, {self.duration_us / 1e6:g} s, seed {self.seed}"
-        lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It counts as no measurement."))]
+        lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It is not a measurement."))]
         records = []
         for fault, value in zip(self.described, self.faults.values(), strict=True):
             often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
@@ -68,7 +68,7 @@ class EmulateAnswer(Answer):
             if is_inside:
                 shown = f"the plan allows this, so {fault.shown_as} is within"
             elif fault.name in self.unsure:
-                shown = f"the plan is less certain than that, so {fault.shown_as} is not shown to be outside"
+                shown = f"smaller than the plan's uncertainty, so measured cannot show {fault.shown_as} as outside"
             lines.append(Sentence((f"{fault.name}: {fault.words}, {often}; {shown}.",)))
             records.append({"value": value, "is_inside_plan": is_inside, **fields(fault, "name", "unit", "shown_as")})
         content = document("emulate", profile=name, **fields(self, "cycles", "duration_us", "seed"), faults=records)
@@ -164,7 +164,7 @@ def emulator_of(profile: Profile) -> Emulator:
     emulator = bus_of(profile).emulator()
     if emulator is None:
         kinds = listed([name for name in kind_names() if kind_named(name).emulator()], "and")
-        raise BusplanError(f"no recording of bus.kind {profile.bus.kind} is emulated, for none is read; {kinds} are")
+        raise BusplanError(f"bus.kind {profile.bus.kind} cannot be emulated; only {kinds} are")
     return emulator
 
 

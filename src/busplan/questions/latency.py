@@ -117,7 +117,7 @@ def latency(
     payload_bytes: int | Iterable[int] | None = None,
     timing_model: Models | None = None,
 ) -> LatencyAnswer:
-    """Show how long data takes to arrive, phase by phase, as `busplan latency` does.
+    """Show the delay of data, phase by phase, as `busplan latency` does.
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ def _by_transaction(
                 )
                 for transaction, share in shares
             )
-            caption = Sentence((f"By the {' and the '.join(models)} model in us, {answer.subject}",))
+            caption = Sentence((f"Times in us by the {' and the '.join(models)} model, {answer.subject}",))
             shown = Table(columns, tuple(rows), caption, heads=1)
             beside = has_deciding and deciding not in models
             yield Detail((shown,), f"the {' and the '.join(models)} model") if beside else shown

@@ -181,7 +181,9 @@ def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
     counts = Counter(figure.verdict for figure in answer.figures if figure.verdict)
     state: State = "fails" if counts["outside"] else "warns" if answer.shows_nothing else "passes"
     inside = f"{counts['within']} of {plural(counts.total(), 'figure')} within the plan"
-    share = "the worst recorded" if answer.quantile == 1 else f"those of {100 * answer.quantile:g} % of the events"
+    share = (
+        "the worst recorded" if answer.quantile == 1 else (f"those that {100 * answer.quantile:g} % of the events keep")
+    )
     yield Sentence(
         (
             Code(answer.profile.name),

@@ -190,8 +190,8 @@ class _CandumpText(_Lines):
             if "ERRORFRAME" in line:
                 return f"(0.0) can {_ERROR_FRAME}#"
             if not self._has_begun:
-                raise BusplanError(f"{self._path}: is no CAN log that is read: {_FORMATS}")
-            raise _DamageError(f"line {number} is none of candump: {line[:60]!r}")
+                raise BusplanError(f"{self._path}: is not a CAN log in a known format: {_FORMATS}")
+            raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
         self._has_begun = True
         if match["stamp"] is None:
             raise _DamageError(f"line {number} has no time; record with `candump -l`")

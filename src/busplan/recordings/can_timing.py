@@ -261,6 +261,6 @@ def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
     if frames.broken:
         yield f"The log is cut or damaged after frame {len(frames.times_us):,}, read up to there: {frames.broken}."
     if stretch.steps_back:
-        yield f"Its clock was set back {plural(stretch.steps_back, 'time')}: the longest stretch between is taken."
+        yield f"Its clock was set back {plural(stretch.steps_back, 'time')}: the longest stretch between is used."
     if stretch.sorted_us:
         yield f"Its frames are up to {stretch.sorted_us / 1000:.3g} ms out of order, as from several queues: sorted."

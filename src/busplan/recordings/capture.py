@@ -118,7 +118,7 @@ def _pieces(
     elif head[:4] == _SECTION:
         walker, held, at = _PcapNg(notes, link), head, 0
     else:
-        raise BusplanError(f"{path}: is no pcap or pcapng file")
+        raise BusplanError(f"{path}: is not a pcap or pcapng file")
     before: int | None = None
     while True:
         content = held + file.read(_PIECE_BYTES)

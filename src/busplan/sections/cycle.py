@@ -33,13 +33,13 @@ UNKNOWN_SHARE: Final = Sourced(
     unit="1",
     grade="assumed",
     source="chosen",
-    meaning="standard uncertainty of a time that nobody has measured, as a share of it",
+    meaning="standard uncertainty of an unmeasured time, as a share of it",
 )
 GUESS_SHARE: Final = Sourced(
     1 / 3**0.5,
     unit="1",
     grade="derived",
-    source="between nothing and twice its value, rectangular (JCGM 100, 4.3.7)",
+    source="between 0 and twice its value, rectangular (JCGM 100, 4.3.7)",
     meaning="standard uncertainty of a time that is assumed, as a share of it",
 )
 MEASURED_UNCERTAINTY_US: Final = Sourced(
@@ -63,7 +63,7 @@ DERIVED_UNCERTAINTY_US: Final = Sourced(
 def time_uncertainty_us(us: Number, *, is_guess: bool) -> Number:
     """Standard uncertainty of a machine's time that nobody has measured [us].
 
-    A guess is between nothing and twice its value; a given time is known to 10 %.
+    A guess is between 0 and twice its value; a given time is known to 10 %.
     """
     return choose(is_guess, GUESS_SHARE, UNKNOWN_SHARE) * us
 
@@ -72,16 +72,14 @@ class GradedExecution(Section):
     """Keys that both forms of the execution time share."""
 
     grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
-        default=None, description="How the execution time is known; the gate warns of assumed", examples=["measured"]
+        default=None, description='Grade of the execution time; the gate warns of "assumed"', examples=["measured"]
     )
     uncertainty_us: TimeUs | None = Field(
         default=None,
         description="Standard uncertainty of the execution time; without it the grade says how large it is [us]",
         examples=[0.5],
     )
-    worst_extra_us: TimeUs = Field(
-        default=0.0, description="What the slowest execution takes beyond the execution time [us]", examples=[3.1]
-    )
+    worst_extra_us: TimeUs = Field(default=0.0, description="Extra time of the slowest execution [us]", examples=[3.1])
 
     @property
     def covered_bytes(self) -> tuple[float, float]:
@@ -111,7 +109,7 @@ class LinearExecution(GradedExecution):
 
     kind: Literal["linear"] = Field(description="Form of the execution time", examples=["linear"])
     base_us: TimeUs = Field(description="Execution time of an empty payload [us]", examples=[30])
-    per_byte_us: TimeUs = Field(description="What each byte of payload adds [us/byte]", examples=[0.35])
+    per_byte_us: TimeUs = Field(description="Execution time per byte of payload [us/byte]", examples=[0.35])
 
     @property
     def ascends_from_bytes(self) -> int:
@@ -132,7 +130,7 @@ class TableExecution(GradedExecution):
         description="Payloads that were measured, ascending [bytes]", examples=[[4, 16]]
     )
     time_us: Annotated[tuple[TimeUs, ...], Field(strict=False, min_length=1)] = Field(
-        description="Execution time T_exec of each [us]", examples=[[36.7, 36.3]]
+        description="Execution time T_exec at each payload [us]", examples=[[36.7, 36.3]]
     )
 
     def _problems(self) -> Iterator[Problem]:
@@ -217,12 +215,8 @@ class PayloadSection(Extended):
     write_bytes: Count | None = Field(
         default=None, description="Payload of the write transaction, or its fixed part [bytes]", examples=[12]
     )
-    read_bytes_per_axis: Count | None = Field(
-        default=None, description="What each axis of a node adds to the read payload [bytes]", examples=[8]
-    )
-    write_bytes_per_axis: Count | None = Field(
-        default=None, description="What each axis of a node adds to the write payload [bytes]", examples=[8]
-    )
+    read_bytes_per_axis: Count | None = Field(default=None, description="Read payload per axis [bytes]", examples=[8])
+    write_bytes_per_axis: Count | None = Field(default=None, description="Write payload per axis [bytes]", examples=[8])
 
     def _problems(self) -> Iterator[Problem]:
         for kind in TRANSACTION_KINDS:

@@ -146,7 +146,7 @@ _GRADED_TIMING: Final = ("interpolation", "step_us")
 
 @_with(
     {
-        name: (ServoGrade | None, Field(default=None, description=f"How servo.{name} is known"))
+        name: (ServoGrade | None, Field(default=None, description=f"Grade of servo.{name}"))
         for name in (*AxisKeys.model_fields, *_GRADED_TIMING)
     }
 )
@@ -160,7 +160,7 @@ class ServoSection(AxisKeys):
     loop: LoopPlace = _key(LoopTiming, "loop")
     update: Literal["next_sync", "on_arrival"] = Field(
         default="next_sync",
-        description="When a node applies a command of a loop on the host: with the next synchronous packet (the "
+        description="Time at which a node applies a host loop's command: with the next synchronous packet (the "
         "paper, III-C), so that one period lies inside the loop, or when it arrives",
         examples=["next_sync"],
     )
@@ -168,11 +168,11 @@ class ServoSection(AxisKeys):
     step_us: float = _key(LoopTiming, "step_us")
     grade: ServoGrade = Field(
         default="assumed",
-        description="How these values are known; reports say so beside every figure that rests on them",
+        description="Grade of these values; reports show it with every figure that depends on them",
         examples=["measured"],
     )
     grades: ServoGrades = Field(
-        default_factory=ServoGrades, description="How single values are known, where not as servo.grade says"
+        default_factory=ServoGrades, description="Grades of single values, where they differ from servo.grade"
     )
     x: AxisOverride = Field(
         default_factory=AxisOverride, description="Values for the x axis, in place of those for both"

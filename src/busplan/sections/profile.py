@@ -66,11 +66,11 @@ class Profile(Section):
         str, Field(min_length=1, max_length=100, pattern=r"\S"), AfterValidator(_without_control_characters(""))
     ] = Field(description="Name in reports", examples=["my-machine"])
     description: Annotated[str, Field(max_length=2000), AfterValidator(_without_control_characters("\n\t"))] = Field(
-        default="", description="What the profile stands for, in words", examples=["Two nodes at 4 ms"]
+        default="", description="Description of the network, in words", examples=["Two nodes at 4 ms"]
     )
     bus: BusSection = Field(description="The bus")
     cycle: CycleSection = Field(description="The communication cycle")
-    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    payload: PayloadSection | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
     # Strictness would refuse TOML's arrays for a tuple; their elements stay strict.
     group: Annotated[tuple[GroupSection, ...], Field(strict=False)] = Field(
@@ -78,12 +78,14 @@ class Profile(Section):
     )
     servo: ServoSection = Field(default_factory=ServoSection, description="Position loop and drive of both axes")
     mechanics: MechanicsSection = Field(
-        default_factory=MechanicsSection, description="What lies between encoders and table"
+        default_factory=MechanicsSection, description="Mechanics between encoders and table"
     )
-    delivery: DeliverySection = Field(default_factory=DeliverySection, description="How set-points arrive at the nodes")
+    delivery: DeliverySection = Field(
+        default_factory=DeliverySection, description="Delays and losses of set-points on their way to the nodes"
+    )
     circle: CircleSection = Field(default_factory=CircleSection, description="The circle of the test")
-    limits: Limits = Field(default_factory=Limits, description="What the gate asks for beyond fitting")
-    tolerance: ToleranceSection = Field(default_factory=ToleranceSection, description="What the circle test must hold")
+    limits: Limits = Field(default_factory=Limits, description="Requirements of the gate beyond fitting")
+    tolerance: ToleranceSection = Field(default_factory=ToleranceSection, description="Tolerances of the circle test")
 
     _constants: ChangedConstants = PrivateAttr(default_factory=changed_constants)
 

@@ -348,12 +348,12 @@ class LoopTiming:
     """Communication period T_s, with a set-point each [us]."""
     loop: LoopPlace = parameter(
         "node",
-        "Where the position loop is closed: on the node each step, or on the host each period",
+        "Place where the position loop is closed: on the node each step, or on the host each period",
         example="node",
     )
     interpolation: Interpolation = parameter(
         "linear",
-        "What a node does between set-points: move on the line between the last two, or hold",
+        "Interpolation between set-points: move on the line between the last two, or hold",
         example="linear",
     )
     """Not used by a loop on the host."""
@@ -422,7 +422,7 @@ class Delivery:
         0.0, "Share of the set-points that never arrive, 0..1", example=0.001, least=0, most=1
     )
     """Drawn for each cycle and node separately."""
-    on_loss: OnLoss = parameter("hold", "What a node does without its set-point", example="hold")
+    on_loss: OnLoss = parameter("hold", "Reaction of a node to a lost set-point", example="hold")
     """Hold the last set-point, or extrapolate the last two."""
     seed: int = parameter(0, "Seed of all that is random", example=1, least=0, most=2**63 - 1)
 

@@ -405,7 +405,7 @@ def test_six_nodes_with_service_messages_fit_four_milliseconds(run: Run, tmp_pat
     # A guess is not enough.
     path.write_text("\n".join((text, *sections)), encoding="utf-8")
     assert busplan.capacity(path).verdict == "not shown to fit"
-    text = text.replace('grade = "assumed"          # between nothing', 'grade = "measured" # not between nothing')
+    text = text.replace('grade = "assumed"          # between 0', 'grade = "measured" # not between 0')
     path.write_text("\n".join((text, *sections)), encoding="utf-8")
     found, _ = busplan.capacity(path).results
     assert found.own["bus_load"] == pytest.approx(0.787, abs=1e-3)
@@ -448,7 +448,7 @@ def test_the_hosts_own_time_is_in_the_cycle_that_it_computes_in() -> None:
     assert terms(hosted)["host"] == 500
     assert terms(busplan.load_profile(hosted, changes={"bus.pipeline_cycles": 1}))["host"] == 0
     found = figures(hosted)
-    # What nobody has measured is between nothing and twice its value, beside the execution time.
+    # What nobody has measured is between 0 and twice its value, beside the execution time.
     own_us = 2 * 0.1 / 12**0.5
     assert found.uncertainty_us == pytest.approx(2 * (own_us**2 + 500**2 / 3) ** 0.5)
     measured = busplan.load_profile(hosted, changes={"bus.host_grade": "measured", "bus.host_uncertainty_us": 5.0})

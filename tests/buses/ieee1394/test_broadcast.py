@@ -264,7 +264,7 @@ def test_a_broken_limit_is_said_by_verdict_and_gate(tmp_path: Path, run: Callabl
     checked = run("check", *arguments, "--no-circle", cwd=tmp_path)
     assert checked.returncode == 1
     assert (
-        f"BP101 error: cycle.period_us: {words} (with --set group.full.nodes=12); less read from each node, or"
+        f"BP101 error: cycle.period_us: {words} (with --set group.full.nodes=12); read less from each node, or"
         in checked.stdout
     )
 

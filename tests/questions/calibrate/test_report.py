@@ -29,25 +29,25 @@ def example() -> busplan.CalibrateAnswer:
 def test_only_repetitions_have_a_spread() -> None:
     assert "std dev" not in str(run(rows((4, 50.0), (64, 80.0))))
     assert "std dev" in str(run(rows((4, 50.0), (4, 52.0))))
-    assert "No outlier can be told at 4 bytes: it takes 3 measurements of a payload." in str(
+    assert "Outliers cannot be found at 4 bytes: that needs 3 measurements of a payload." in str(
         run(rows((4, 50.0), (4, 198.0)))
     )
 
 
 def test_warnings() -> None:
     assert warnings(run(rows((64, 80.0)))) == [
-        "the profile's payload of 4 bytes is outside what was measured, 64 to 64 bytes: measure it."
+        "the profile's payload of 4 bytes is outside the measured range, 64 to 64 bytes: measure it."
     ]
     assert "is latency_us in us?" in warnings(run(rows((4, 48_700.0))))[0]
     (short,) = warnings(run(rows((4, 20.0))))
-    assert short.startswith("the bus waits 10.549 us before any response, so a shorter execution cannot be told from")
+    assert short.startswith("the bus waits 10.549 us before any response, so shorter executions do not show in")
     many = run(rows(*((4, 50.0 if index % 4 else 90.0 + index) for index in range(60))))
     (warning,) = warnings(many)
     assert warning.startswith(
         "15 slow measurements: line 1 (90 us at 4 bytes: T_exec +40.0 us off the median), line 5 (94 us at 4 bytes: "
     )
     assert warning.endswith(
-        "off the median) and 5 more; left out: the slowest execution takes 96.001 us more, worst_extra_us."
+        "off the median) and 5 more; left out. The slowest execution takes 96.001 us longer, worst_extra_us."
     )
     assert f"Warning: {warning}\n" in str(many)
     # Ten lines are named.

@@ -173,7 +173,7 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     assert verdict == "DOES NOT FIT"
     assert lines["short by"] == "20 us, +/- 6"
     assert lines["buses"] == "2 such buses, of 1 node or fewer"
-    assert lines["paper model"] == "says otherwise, 207 us needed of 250, but does not decide"
+    assert lines["paper model"] == "says otherwise: needs 207 us of 250; it does not decide"
     assert "room for" not in lines
     # Where nodes differ, nobody said which of them are to be more: no change is looked for, and none is spoken of.
     verdict, lines = card_of(busplan.capacity("gantry-24", period_us=1900))

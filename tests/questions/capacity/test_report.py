@@ -31,10 +31,10 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
         "largest part": "execution, 147 us",
         "largest doubt": "execution time, +/- 5 us",
         "rests on": "an instant host, no busy retries, PHYs of 14 ticks and 2 more",
-        "never measured": "the cycle of several nodes, one by one",
-        "correction": "6.62 us in what is used: measured buses take so much longer than the timing model",
+        "never measured": "the cycle of several nodes in the individual schedule",
+        "correction": "6.62 us included in used: measured buses take this much longer than the timing model",
         "checked against": "broadcasts (the dVRK)",
-        "paper model": "says otherwise, 207 us needed of 250, but does not decide",
+        "paper model": "says otherwise: needs 207 us of 250; it does not decide",
     }
 
 
@@ -122,7 +122,7 @@ def test_several_periods_share_a_table_and_what_holds_for_all_is_said_once() -> 
     assert text.count("  rests on ") == text.count("  largest part ") == 1
     assert text.index(" 550 us ") < text.index("  rests on ")
     # What speaks against a verdict is of its period.
-    assert re.findall("says otherwise, 207 us needed of ([0-9]+)", text) == ["250", "275"]
+    assert re.findall("says otherwise: needs 207 us of ([0-9]+)", text) == ["250", "275"]
 
 
 def test_what_fails_is_marked_where_it_stands_and_the_card_stands_alone() -> None:

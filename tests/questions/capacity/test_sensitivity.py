@@ -27,13 +27,13 @@ def with_longer_execution(profile: busplan.Profile) -> dict[str, Any]:
 
 WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "execution time +10%": with_longer_execution,
-    "one node more": lambda profile: {"bus.nodes": profile.node_groups[0].nodes + 1},
-    "one axis more per node": lambda profile: {"node.axes": profile.node_groups[0].node.axes + 1},
+    "one more node": lambda profile: {"bus.nodes": profile.node_groups[0].nodes + 1},
+    "one more axis per node": lambda profile: {"node.axes": profile.node_groups[0].node.axes + 1},
     "payload +4 bytes": lambda profile: {
         f"payload.{kind}_bytes": 4 + (getattr(profile.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
     },
-    "one hop more": lambda profile: {"bus.max_hops": profile.bus.max_hops + 1},
-    "one busy retry more": lambda profile: {"cycle.retries": profile.cycle.retries + 1},
+    "one more hop": lambda profile: {"bus.max_hops": profile.bus.max_hops + 1},
+    "one more busy retry": lambda profile: {"cycle.retries": profile.cycle.retries + 1},
     "host time +10 us": lambda profile: {"host.transaction_us": profile.host.transaction_us + 10},  # type: ignore[attr-defined]
     "a bus reset": lambda _one: {"bus.gap_count": 63},
 }
@@ -67,7 +67,7 @@ def test_each_row_is_the_capacity_of_the_profile_with_that_change(
     before, by_change = figures(profile), effects(profile)
     assert set(by_change) == set(WRITTEN)
     for change, effect in by_change.items():
-        if change == "one hop more" and profile.bus.max_hops is None:
+        if change == "one more hop" and profile.bus.max_hops is None:
             assert (effect.margin_change_us, effect.then) == (None, None)
             continue
         after = figures(changed(profile, WRITTEN[change](profile)))
@@ -98,7 +98,7 @@ def test_what_adds_to_the_margin_has_its_place_by_its_size(make: Maker) -> None:
     # Table I has such a fall between 4 and 16 bytes, of 0.1 us.
     falling = {"kind": "table", "payload_bytes": [4, 8], "time_us": [200.0, 100.0]}
     ranked = [*effects(make(node__execution=falling, payload__read_bytes=4, payload__write_bytes=4)).values()]
-    assert [effect.change for effect in ranked[:3]] == ["one node more", "payload +4 bytes", "execution time +10%"]
+    assert [effect.change for effect in ranked[:3]] == ["one more node", "payload +4 bytes", "execution time +10%"]
     assert [(effect.margin_change_us or 0) > 0 for effect in ranked[:3]] == [False, True, False]
 
 
@@ -106,7 +106,7 @@ def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None
     by_change = effects(make())
     for change, note in (
         ("a bus reset", "it is set so already"),
-        ("one axis more per node", "no payload follows the axes"),
+        ("one more axis per node", "no payload follows the axes"),
         ("host time +10 us", "the gaps after the transactions hide it"),
     ):
         assert (by_change[change].margin_change_us, by_change[change].note) == (0.0, note)
@@ -115,7 +115,7 @@ def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None
     execution = off["execution time +10%"]
     assert (execution.margin_change_us, execution.note) == (0.0, "no execution time is on the bus")
     moved = effects(make(bus__gap_count=8, payload__read_bytes_per_axis=8))
-    assert [moved[change].note for change in ("a bus reset", "one axis more per node", "host time +10 us")] == [""] * 3
+    assert [moved[change].note for change in ("a bus reset", "one more axis per node", "host time +10 us")] == [""] * 3
 
 
 def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
@@ -124,7 +124,7 @@ def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
     assert (effect.margin_change_us, effect.then, effect.before, effect.after) == (None, None, 12, 16)
     assert effect.note == "not known: 16 bytes is outside the execution table, 4 to 14 bytes"
     data = {"node__execution": TABLE, "payload__write_bytes": 4, "payload__read_bytes": 2}
-    axis = effects(make(**data, payload__read_bytes_per_axis=3))["one axis more per node"]
+    axis = effects(make(**data, payload__read_bytes_per_axis=3))["one more axis per node"]
     assert (axis.then, axis.note) == (None, "not known: 17 bytes is outside the execution table, 4 to 14 bytes")
     # Between its points it is as known as before.
     profile = changed(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
@@ -136,13 +136,13 @@ def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
 
 def test_hops_follow_the_nodes_in_a_chain_and_not_in_a_tree(make: Maker) -> None:
     chain, tree = effects(make(bus__nodes=4)), effects(make(bus__nodes=4, bus__max_hops=4))
-    assert chain["one hop more"].note == "in a chain the hops follow the nodes"
-    assert (tree["one hop more"].before, tree["one hop more"].after) == (4, 5)
-    hop_us, node_us = tree["one hop more"].margin_change_us, tree["one node more"].margin_change_us
+    assert chain["one more hop"].note == "in a chain the hops follow the nodes"
+    assert (tree["one more hop"].before, tree["one more hop"].after) == (4, 5)
+    hop_us, node_us = tree["one more hop"].margin_change_us, tree["one more node"].margin_change_us
     assert hop_us is not None
     assert node_us is not None
     # Another node of the chain brings its hop, too, which all five are then charged.
-    assert chain["one node more"].margin_change_us == pytest.approx(node_us + hop_us * 62 / 50, rel=1e-3)
+    assert chain["one more node"].margin_change_us == pytest.approx(node_us + hop_us * 62 / 50, rel=1e-3)
 
 
 def test_what_changes_has_its_values_where_they_are_one(make: Maker) -> None:
@@ -158,7 +158,7 @@ def test_what_changes_has_its_values_where_they_are_one(make: Maker) -> None:
 
 
 def test_a_change_that_the_profile_refuses_is_said_so(make: Maker) -> None:
-    effect = effects(make(cycle__retries=1_000_000))["one busy retry more"]
+    effect = effects(make(cycle__retries=1_000_000))["one more busy retry"]
     assert effect.then is None
     assert effect.note == "cycle.retries 1000001: must be 1,000,000 or less"
 
@@ -168,8 +168,8 @@ def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
     rows, now = effects(gantry), figures(gantry)
     for group in gantry.group:
         for change, key, more in (
-            (f"one node more in {group.name}", "nodes", group.nodes + 1),
-            (f"one axis more per node in {group.name}", "axes", group.axes + 1),
+            (f"one more node in {group.name}", "nodes", group.nodes + 1),
+            (f"one more axis per node in {group.name}", "axes", group.axes + 1),
         ):
             row = rows[change]
             assert (row.key, row.before, row.after) == (f"group.{group.name}.{key}", more - 1, more)
@@ -178,7 +178,7 @@ def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
             assert row.then.margin_corrected_us == then.margin_corrected_us
             moved_us = (row.then.margin_corrected_us or 0) - (now.margin_corrected_us or 0)
             assert row.margin_change_us == moved_us
-    assert rows["one axis more per node in io"].note == "no payload follows the axes"
+    assert rows["one more axis per node in io"].note == "no payload follows the axes"
     assert [limit.group for limit in next_bottleneck(gantry).limits] == ["drives", "tool", "io"]
 
 

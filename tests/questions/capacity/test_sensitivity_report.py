@@ -49,28 +49,28 @@ def test_a_csv_row_is_a_change_at_a_period() -> None:
     assert {row["period_us"] for row in rows} == {"1000.0", "500.0"}
     assert (rows[0]["profile"], rows[0]["timing_model"], rows[0]["key"]) == ("paper-1ms", "standard", "bus.nodes")
     last = rows[len(changes) - 1]
-    assert (last["change"], last["margin_change_us"], last["verdict"]) == ("one hop more", "", "")
+    assert (last["change"], last["margin_change_us"], last["verdict"]) == ("one more hop", "", "")
 
 
 def test_it_says_what_moves_the_margin_most_and_what_is_lost() -> None:
     text = text_of(paper())
-    assert "One node more moves the margin most, by -128 us to 102 us. The cycle is shown to fit after" in text
+    assert "One more node moves the margin most, by -128 us to 102 us. The cycle is shown to fit after" in text
     assert "A bus reset: it is set so already." in text
-    assert "One hop more: in a chain the hops follow the nodes." in text
-    assert "The cycle is no longer shown to fit after one node more." in text_of(paper(cycle__period_us=700))
+    assert "One more hop: in a chain the hops follow the nodes." in text
+    assert "The cycle is no longer shown to fit after one more node." in text_of(paper(cycle__period_us=700))
     over = text_of(paper(cycle__period_us=400))
     assert "no longer" not in over
     assert "is shown to fit after" not in over
     # A gap count that is safe for two hops is not for three.
     tight = text_of(paper(bus__gap_count=7))
-    assert "Its gap count is unsafe after one node more." in tight
+    assert "Its gap count is unsafe after one more node." in tight
     assert "fits, unsafe gap count" in tight
     assert "does not fit, hops" in text_of(paper(bus__nodes=16, cycle__period_us=10000))
 
 
 def test_where_nothing_takes_the_largest_term_away_it_says_what_comes_behind() -> None:
     text = text_of(busplan.load_profile("paper-dma"))
-    assert "Next bottleneck: after idle, 84.2 us, which no key takes away, comes execution, 42.4 us;" in text
+    assert "Next bottleneck: no key removes idle, 84.2 us; the next term is execution, 42.4 us;" in text
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "ethercat-servo-8", "sercos2-servo-8"])

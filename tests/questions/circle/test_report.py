@@ -63,7 +63,8 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     verdict = blocks(test, Sentence)[0]
     assert sentence_text(verdict) == (
         "ethercat-servo-8 at 1 ms and 3000 mm/min: no error source of this profile matters; circular deviation G "
-        "below 0.1 um, which says nothing of how round a machine is: friction at reversals, backlash, squareness and "
+        "below 0.1 um, so the test says nothing about the roundness of a machine: friction at reversals, backlash, "
+        "squareness and "
         "jitter are 0."
     )
     assert verdict.state == "warns"
@@ -81,10 +82,10 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     ideal = busplan.circle_test("dvrk")
     assert "largest contour error below 0.1 um" in texts(ideal)[0]
     # The sources that a machine usually has are named where they are 0: of both axes.
-    assert "machine is: drive lag, friction at reversals, backlash, squareness and jitter are 0." in texts(ideal)[0]
+    assert "machine: drive lag, friction at reversals, backlash, squareness and jitter are 0." in texts(ideal)[0]
     small = {"servo.x.drive_lag_us": 1, "servo.y.reversal_mm_s": 1e-6, "mechanics.squareness_um_per_m": 1e-6}
     some = busplan.circle_test(busplan.load_profile("dvrk", changes={**small, "delivery.jitter_us": 1e-6}))
-    assert "machine is: backlash is 0." in texts(some)[0]
+    assert "machine: backlash is 0." in texts(some)[0]
     # Without a tolerance G of a whole turn says it, though chords leave the largest error over 0.1 um.
     changes = {"tolerance": {}, "servo.drive_lag_us": 1000, "circle.feed_mm_per_min": 3000}
     turn = busplan.circle_test(busplan.load_profile("ethercat-servo-8", changes=changes))
@@ -165,7 +166,7 @@ def test_a_circle_that_fails_says_by_how_much_and_what_to_attack(values_in: Valu
 def test_what_no_single_source_explains_is_said() -> None:
     test = circle_of(*TIGHT.items())
     none = replace(test, results=(test.results[0]._replace(contributions=()),))
-    assert "No single error source of the profile explains the mean contour error." in texts(none)
+    assert "No error source of the profile, when removed, reduces the mean contour error." in texts(none)
     assert "The profile has no error source that could be removed." in texts(none)
 
 
@@ -223,11 +224,11 @@ def legend_of(test: busplan.CircleTestAnswer) -> str:
 def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float, words: str) -> None:
     test = small(ranked=False, tolerance__max_contour_error_mm=tolerance_mm)
     legend = legend_of(test)
-    assert re.match(r"Magnified \d+ times; [\d.]+ um from ring to ring, the nominal", legend)
+    assert re.match(r"Magnified \d+ times; rings every [\d.]+ um; bold: the nominal", legend)
     assert "; the dot is the start of the turn, the arrow its direction; " in legend
     assert legend.endswith(words)
     assert test.html.count('<figure class="round">') == test.html.count('class="band first"') == 1
-    assert "from ring to ring" in test.html
+    assert "rings every" in test.html
     assert "ring" not in str(test)
 
 

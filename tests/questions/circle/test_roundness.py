@@ -98,7 +98,7 @@ def test_a_circle_that_the_bus_is_not_shown_to_carry_is_simulated_and_fails(smal
         ("safe_required_us", capacity.safe_required_us, capacity.available_us)
     ]
     assert result.failures[0].text == (
-        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve 287.499 us needed of 280.000 us"
+        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve it needs 287.499 us of 280.000 us"
     )
     # 290 us show it.
     assert only(changed(tight, {"cycle.period_us": 580, "servo.step_us": 20})).verdict == "fits"

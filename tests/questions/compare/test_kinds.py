@@ -192,7 +192,7 @@ def test_the_smallest_period_of_a_limit_is_exact() -> None:
 
 def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
     for machine, why in (
-        (on_kind(INPUTS, "can"), "a PDO of 40 bytes is over the 32 bytes of four frames (a smaller payload would do)"),
+        (on_kind(INPUTS, "can"), "a PDO of 40 bytes is over the 32 bytes of four frames (use a smaller payload)"),
         (on_kind(changed("paper-4ms", cycle__nonperiodic_us=MAX_TIME_US)), "at most 500000000.000 us can be given"),
         (on_kind(changed("sercos3-servo-8", cycle__nonperiodic_us=1e5)), "at most 65000.000 us can be given"),
     ):

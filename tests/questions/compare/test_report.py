@@ -28,14 +28,14 @@ def row(answer: busplan.CompareAnswer, start: str) -> list[str]:
 
 def test_the_first_lines_say_where_it_fits_and_which_kind_is_best() -> None:
     assert lines_of(PAPER)[:4] == [
-        "paper-1ms at 1 ms: fits on IEEE 1394, its own bus; with what is assumed of other buses, shown to fit on none.",
+        "paper-1ms at 1 ms: fits on IEEE 1394, its own bus; with assumed values of other buses, shown to fit on none.",
         "The smallest period is 552.494 us on IEEE 1394.",
         "The most axes at 1 ms are 12 on IEEE 1394.",
-        "On another kind than its own the machine has the bus of a new profile, which is assumed.",
+        "On other kinds of bus the machine has the bus of a new profile, with assumed values.",
     ]
     assert lines_of(busplan.compare(INPUTS, buses="can"))[:2] == [
-        "gantry-24 at 2 ms: with what is assumed of other buses, shown to fit on none.",
-        "Axes are counted with more nodes of drives, the other groups as they are.",
+        "gantry-24 at 2 ms: with assumed values of other buses, shown to fit on none.",
+        "Axes are counted with more nodes of drives, with the other groups unchanged.",
     ]
 
 
@@ -136,7 +136,7 @@ def test_a_kind_that_cannot_have_it_is_a_row_with_the_reason(tmp_path: Path) -> 
     assert (other["verdict"], len(other["why_not"])) == (None, 1)
     assert rows_of(found, tmp_path)[1]["verdict"] == ""
     alone = busplan.compare(long, buses="ieee1394")
-    none = "ethercat-servo-8 at 1 ms: with what is assumed of other buses, shown to fit on none."
+    none = "ethercat-servo-8 at 1 ms: with assumed values of other buses, shown to fit on none."
     assert lines_of(alone)[0] == none
     with pytest.raises(busplan.BusplanError, match="there is nothing to draw"):
         alone.drawing()

@@ -40,11 +40,14 @@ def text(a: busplan.Profile, changes: dict[str, object]) -> list[str]:
         ),
         (
             {"bus.gap_count": 3},
-            "a.toml (A) fits, b.toml (B) fits, but its gap count is not safe; B is worse in 3 figures: gap count is ",
+            "a.toml (A) fits, b.toml (B) fits, but gap count is unsafe; B is worse in 3 figures: gap count is ",
         ),
         (
             {"limits.min_spare_nodes": 5},
-            "a.toml (A) fits, b.toml (B) fits, but it misses limits.min_spare_nodes; no figure is better or worse.",
+            (
+                "a.toml (A) fits, b.toml (B) fits, but it does not meet limits.min_spare_nodes; no figure is better or "
+                "worse."
+            ),
         ),
         ({"node.axes": 5}, "a.toml (A) fits, b.toml (B) fits; B is better in 2 figures: safe axes and most axes."),
         (

@@ -131,7 +131,7 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
     [
         ("can-servo-8", "late-command", 600, "within", "the plan allows this, so last PDO after SYNC is within"),
         ("can-servo-8", "jitter", 100, "within", "the plan allows this, so SYNC: jitter of the arrival is within"),
-        ("can-servo-8", "late-command", 1200, "not shown", "so last PDO after SYNC is not shown to be outside"),
+        ("can-servo-8", "late-command", 1200, "not shown", "so measured cannot show last PDO after SYNC as outside"),
         ("can-servo-8", "late-command", 3000, "outside", "measured shows last PDO after SYNC"),
         ("ethercat-servo-8", "jitter", 10, "outside", "measured shows latest start"),
     ],
@@ -445,7 +445,7 @@ def test_the_command_writes_the_answer_of_the_function(run: Run, tmp_path: Path)
     assert (tmp_path / "log.candump").read_bytes() == answer.content
     assert done.stderr.splitlines() == [
         "wrote log.candump",
-        "Synthetic recording of can-servo-8: 30 cycles, 0.12 s, seed 5. It counts as no measurement.",
+        "Synthetic recording of can-servo-8: 30 cycles, 0.12 s, seed 5. It is not a measurement.",
         "late-command: the host sends its commands late, 5 times, 3000 us; measured shows last PDO after SYNC.",
         "error-frame: a frame is destroyed and sent again, 2 times; measured shows error frames.",
     ]
@@ -464,7 +464,7 @@ def test_the_help_names_all_faults() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("paper-4ms", "-o", "x.log"), "bus.kind ieee1394 is emulated, for none is read; can and ethercat are"),
+        (("paper-4ms", "-o", "x.log"), "bus.kind ieee1394 cannot be emulated; only can and ethercat are"),
         (("can-servo-8", "-o", "x.pcapng"), "--output x.pcapng: expected a name ending in .log, .candump"),
         (("ethercat-servo-8", "-o", "x.pcap"), "--output x.pcap: expected a name ending in .pcapng"),
         (("can-servo-8", "--fault", "jiter"), "there are missing-cycle, missing-pdo, double-pdo, late-command, jitter"),

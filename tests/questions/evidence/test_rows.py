@@ -48,7 +48,10 @@ def test_a_new_comparison_is_a_row(table: dict[str, Any]) -> None:
         (lambda table: table.update(unit="ms"), "unit: Input should be 'us', '1'"),
         (lambda table: table.pop("title"), "[[evidence]] None: title: Field required"),
         (lambda table: table["rows"].clear(), "rows: List should have at least 1 item"),
-        (lambda table: table["rows"][0].update(published=3), "a published figure has a grade, and nothing else has"),
+        (
+            lambda table: table["rows"][0].update(published=3),
+            "a published figure needs a grade; a computed one has none",
+        ),
         (lambda table: table.update(figures=["margn_us"]), "'margn_us' is no number of sercos2-servo-8, a bus of kind"),
         (lambda table: table.update(figures=["verdict"]), "'verdict' is no number"),
         (lambda table: table.update(figures=["circle.roundness"]), "'circle.roundness' is no number"),

@@ -318,11 +318,11 @@ def test_periods_models_and_transactions_multiply() -> None:
 @pytest.mark.parametrize(
     ("figure", "asked", "said"),
     [
-        ("uncertainty_us", {"timing_model": "paper"}, "the timing model that decides and to no other, standard"),
+        ("uncertainty_us", {"timing_model": "paper"}, "exists only in the timing model that decides, standard"),
         ("required_us", {"transaction": "read"}, "required_us: a figure of capacity, which has no transactions"),
         ("gaps_us", {"transaction": "read"}, "which has no transactions; latency.gaps_us has"),
         ("latency_us", {"transaction": "raed"}, "transaction 'raed': expected 'read' or 'write'"),
-        (None, {"period_us": 100, "transaction": "read"}, "period_us and transaction: goes with a figure"),
+        (None, {"period_us": 100, "transaction": "read"}, "period_us and transaction: needs a figure"),
         (3, {}, 'figure 3: expected a key of the JSON, as "required_us"'),
     ],
 )
@@ -339,7 +339,7 @@ def test_a_step_says_nothing_twice_and_inputs_that_are_the_same_stand_once() -> 
     assert "H = N: a chain with the host at its end\n                      = 2\n" in text
     both = str(busplan.explain("paper-1ms", "latency.gaps_us", timing_model="standard"))
     assert both.count("Inputs of this figure") == 1
-    assert "It starts from the same inputs as gaps_us, read, standard model." in both
+    assert "Inputs: as for gaps_us, read, standard model." in both
 
 
 @pytest.mark.parametrize("width", [40, 60, 80])

@@ -134,7 +134,7 @@ def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
         lanes, lanes_of_groups = (busplan.timeline(bus, timing_model=uniform.timing_model) for bus in (profile, split))
         assert lanes_of_groups.events == lanes.events
         for nodes, group in zip(parts, grouped.groups, strict=True):
-            # The other groups are there already; a bus that is too full with one node more of any carries none.
+            # The other groups are there already; a bus that is too full with one more node of any carries none.
             for key in ("max_nodes", "safe_nodes"):
                 most = getattr(uniform, key)
                 expected = None if most is None else max(most - (sum(parts) - nodes), 0)

@@ -156,7 +156,14 @@ def test_one_eds_stands_for_nodes(nodes: Any, numbers: list[int], tmp_path: Path
         ("2", {"a.dcf": dcf(5)}, r"a\.dcf:\d+: NodeID 5 is set"),
         ("2", {"a.eds": EDS, "b.eds": EDS}, r"a\.eds and .*b\.eds are both an EDS"),
         ("2", {"machine.dbc": DATABASE}, "none of the files is an EDS"),
-        ("2", {"a.eds": EDS.replace("$NODEID+0x180", "0x181")}, r"TPDO1 of node 1 and of node 2 would both be 0x181"),
+        (
+            "2",
+            {"a.eds": EDS.replace("$NODEID+0x180", "0x181")},
+            (
+                r"TPDO1 of node 1 and of node 2 would both have "
+                r"identifier 0x181, because the file lacks"
+            ),
+        ),
     ],
 )
 def test_nodes_that_files_contradict_are_refused(nodes: str, files: dict[str, str], words: str, tmp_path: Path) -> None:

@@ -184,7 +184,7 @@ def test_the_plan_of_a_log_allows_every_window_and_little_more_load(sort: str, s
     times = traffic(sort, seed)
     answer = imported(times, tmp_path)
     require_covered(answer, times)
-    apart = any("messages of the log come at different times" in remark for remark in answer.remarks)
+    apart = any("messages coincide that the log has at different times" in remark for remark in answer.remarks)
     assert apart == (ratio_of(answer, times) > 1.2)
     # No other reason for more load: each in its own fullest second, they would load the bus so much.
     assert not apart or of_own_seconds(answer, times) > 1.2

@@ -250,7 +250,7 @@ FILES = sorted((Path(__file__).parent / "files").iterdir())
 def test_a_machine_s_file_that_is_no_profile_is_named(path: Path, command: str, run: Callable[..., Any]) -> None:
     done = run(command, str(path))
     said = done.stdout if command == "check" else done.stderr
-    assert "and no profile: `busplan import " in said
+    assert "not a profile; convert it with `busplan import " in said
     assert done.returncode == (1 if command == "check" else 2)
 
 

@@ -62,7 +62,7 @@ REFUSED = {
             "<Bus name='M'><Message id='0x1' name='A'/></Bus>"
             "<Bus name='N'><Message id='0x1' name='A'/></Bus></NetworkDefinition>"
         ),
-        ":1: messages of 2 buses, M, N: a profile is one bus; --bus NAME reads one",
+        ":1: messages of 2 buses, M, N: a profile describes one bus; --bus NAME reads one",
     ),
     "a signal cut off": ("BO_ 256 A: 8 X\n SG_ B : 0|16@1+ (1,", ":2: ends within a signal: cut off"),
     "no PDO": ("[DeviceInfo]\nProductName=x\n", ":1: no PDO is switched on"),

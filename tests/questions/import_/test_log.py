@@ -112,30 +112,30 @@ def test_each_value_says_where_it_is_from(tmp_path: Path) -> None:
     assert text.partition("\n\n")[2].splitlines() == [
         "[bus]",
         'kind = "can"               # published: drive.log:1',
-        "bit_rate_kbit_s = 250      # assumed: by frames of the log directly after each other",
-        "identifier_bits = 29       # published: of most messages, drive.log:1",
+        "bit_rate_kbit_s = 250      # assumed: from back-to-back frames in the log",
+        "identifier_bits = 29       # published: used by most messages, drive.log:1",
         "",
         "[[message]]",
         'name = "id-0x80"',
         "identifier = 128           # measured: 0x80, drive.log",
         "identifier_bits = 11       # measured: drive.log",
         "payload_bytes = 0          # measured: the most seen, drive.log",
-        "period_us = 1990000        # measured: 1 frame, not periodic: the most in a longer time, drive.log",
-        'deadline_us = "none"       # assumed: nobody gave one, and it does not keep to a period',
+        "period_us = 1990000        # measured: 1 frame, not periodic: largest rate over a longer time, drive.log",
+        'deadline_us = "none"       # assumed: not given, and the message is not periodic',
         "",
         "[[message]]",
         'name = "id-0xcf00400"',
         "identifier = 217056256     # measured: 0xcf00400, drive.log",
         "payload_bytes = 3          # measured: the most seen, drive.log",
         "period_us = 20000          # measured: 100 frames, U 4.8 us, drive.log",
-        "jitter_us = 212            # measured: of the arrival, the wait for other frames in it, drive.log",
+        "jitter_us = 212            # measured: of the arrival, waiting for other frames included, drive.log",
         "",
         "[[message]]",
         'name = "id-0x18fef1fe"',
         "identifier = 419361278     # measured: 0x18fef1fe, drive.log",
         "payload_bytes = 8          # measured: the most seen, drive.log",
         "period_us = 10000          # measured: 200 frames, U 1.2 us, drive.log",
-        "jitter_us = 29             # measured: of the arrival, the wait for other frames in it, drive.log",
+        "jitter_us = 29             # measured: of the arrival, waiting for other frames included, drive.log",
     ]
 
 
@@ -169,7 +169,7 @@ def test_frames_at_once_behind_each_other_show_the_bit_rate(bit_rate: float, tmp
     ]
     answer = imported(candump(arbitrated(queued, bit_us=1000 / bit_rate)), tmp_path)
     assert can_profile(answer).bus.bit_rate_kbit_s == bit_rate
-    assert f"The bit rate is {bit_rate:g} kbit/s by frames of the log directly after each other" in answer.remarks
+    assert f"The bit rate is {bit_rate:g} kbit/s, from back-to-back frames in the log" in answer.remarks
 
 
 FRAME: Final = Logged(0, 0x2AA, b"\xa5" * 8, extended=False, bits=0)
@@ -203,7 +203,7 @@ def test_frames_do_not_overlap(gaps_us: list[float], lowest: float, least: str, 
     text = spaced(gaps_us)
     with pytest.raises(busplan.BusplanError, match=rf"The load of its fullest second is \d+ % at {lowest:g}, "):
         imported(text, tmp_path)
-    with pytest.raises(busplan.BusplanError, match=f"frames of the log need no less than {least} kbit/s"):
+    with pytest.raises(busplan.BusplanError, match=f"frames of the log need at least {least} kbit/s"):
         imported(text, tmp_path, bit_rate_kbit_s=float(least) - 1)
     assert can_profile(imported(text, tmp_path, bit_rate_kbit_s=lowest)).bus.bit_rate_kbit_s == lowest
 
@@ -254,7 +254,7 @@ def test_a_database_gives_names_and_periods_and_the_log_the_rest(tmp_path: Path)
         assert (door.payload_bytes, door.period_us) == (8, 50_000)
         assert messages["id-0x12c"].fd
         assert any(remark.startswith("left out, never in ") and "Wake" in remark for remark in answer.remarks)
-        assert any(", every 20,000 by car.dbc:2: the log's is taken" in remark for remark in answer.remarks)
+        assert any(", every 20,000 by car.dbc:2: the log's is used" in remark for remark in answer.remarks)
 
 
 def test_a_log_that_needs_more_than_the_bit_rate_of_a_database_has_its_own(tmp_path: Path) -> None:
@@ -410,13 +410,16 @@ QUEUES = "".join(
     for k in range(10)
 )
 SAID = {
-    "cut": (LINES + "(17000", "The log is cut or damaged after frame 40, read up to there: line 41 is none of candump"),
+    "cut": (
+        LINES + "(17000",
+        "The log is cut or damaged after frame 40, read up to there: line 41 is not a candump line",
+    ),
     "clock": (
         LAST + LINES,
-        "Its clock was set back 1 time: the longest stretch between is taken.",
+        "Its clock was set back 1 time: the longest stretch between is used.",
     ),
     "queues": (QUEUES, "Its frames are up to 87 ms out of order, as from several queues: sorted."),
-    "errors": (LINES + LINE.format(99_000, "20000080#0000000000000000"), "1 error frame: in no load"),
+    "errors": (LINES + LINE.format(99_000, "20000080#0000000000000000"), "1 error frame: not counted in the load"),
     "remote": (LINES + LINE.format(99_000, "182#R8"), "1 remote frame: taken with the data of the length code"),
     "seldom": (
         LINES + LINE.format(99_000, "182#"),
@@ -438,7 +441,7 @@ def test_bursts_are_planned_as_bursts(tmp_path: Path) -> None:
     starts = [k * 100_000.0 + near for k in range(50) for near in (0, 400, 800)]
     lines = candump([Logged(us, 0x7E8, bytes(8), False, 0) for us in starts])
     answer = imported(lines, tmp_path, bit_rate_kbit_s=500)
-    assert "in bursts, each with the most that the log has together: 0x7e8" in answer.remarks
+    assert "in bursts, each with the largest burst in the log: 0x7e8" in answer.remarks
     (message,) = can_profile(answer).message
     # Their mean distance, and not that of the closest.
     assert message.burst == 3

@@ -98,7 +98,7 @@ def test_files_that_differ_say_so(tmp_path: Path) -> None:
     (tmp_path / "conf.xml").write_text(text, encoding="utf-8")
     answer = busplan.import_profile([FILES / "pdos.txt", tmp_path / "conf.xml"])
     (said,) = (remark for remark in answer.remarks if "read_bytes" in remark)
-    assert said.startswith("node 2: read_bytes is 7 at conf.xml:9 and 8 at pdos.txt:14; the first is taken, in 1 more")
+    assert said.startswith("node 2: read_bytes is 7 at conf.xml:9 and 8 at pdos.txt:14; the first is used, in 1 more")
     assert answer.profile.group[-1].read_bytes == 7
 
 
@@ -107,7 +107,7 @@ def test_files_of_two_machines_are_refused(tmp_path: Path) -> None:
     (tmp_path / "pdos.txt").write_text(shorter, encoding="utf-8")
     with pytest.raises(busplan.BusplanError, match=r"has 4 devices and .*pdos.txt 3: these are two machines"):
         busplan.import_profile([FILES / "slaves.txt", tmp_path / "pdos.txt"])
-    with pytest.raises(busplan.BusplanError, match=r"is of can and .* of ethercat: a profile is one bus"):
+    with pytest.raises(busplan.BusplanError, match=r"is of can and .* of ethercat: a profile describes one bus"):
         imported("axis-5.dcf", "slaves.txt")
     with pytest.raises(busplan.BusplanError, match="are both node 5"):
         imported("axis-5.dcf", str(_copy(FILES / "axis-5.dcf", tmp_path / "other.dcf")))

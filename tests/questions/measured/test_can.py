@@ -216,7 +216,7 @@ def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
     middle = LOGGED[len(LOGGED) * 2 // 3].us
     logged = [frame._replace(us=frame.us - (frame.us > middle) * 1e6) for frame in LOGGED]
     answer = of_log(candump(logged), tmp_path)
-    assert "Its clock was set back 1 time: the longest stretch between is taken." in answer.remarks
+    assert "Its clock was set back 1 time: the longest stretch between is used." in answer.remarks
     assert figure(answer, "SYNC: period").verdict == "within"
     assert figure(answer, "SYNC: period").events in {200, 201}
 
@@ -225,7 +225,10 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    words = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load: the plan has no "
+    words = (
+        "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 not counted in the load: the "
+        "plan has no "
+    )
     assert f"{words}data bit rate." in answer.remarks
     assert "1 remote frame: the length code is shown as data." in answer.remarks
     assert figure(answer, "error frames").recorded == 1
@@ -323,9 +326,10 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
     named = "can0 (30 frames), can1 (10 frames); --channel NAME reads one"
     assert refusal(two) == f"bus.log: has frames of 2 channels: {named}"
     assert refusal("a,b\n") == (
-        "bus.log: is no CAN log that is read: text of candump, Vector's ASC and BLF, PEAK's TRC, captures of SocketCAN"
+        "bus.log: is not a CAN log in a known format: text of candump, Vector's ASC and BLF, PEAK's TRC, captures "
+        "of SocketCAN"
     )
-    assert refusal("(1700000000.000000) can0 \n").startswith("bus.log: is no CAN log")
+    assert refusal("(1700000000.000000) can0 \n").startswith("bus.log: is not a CAN log")
     assert refusal("") == "bus.log: has no CAN frame"
     monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
     assert "install it with the extra, as in pip install 'busplan[import]'" in refusal(candump(LOGGED[:3]))

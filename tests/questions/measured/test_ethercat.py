@@ -319,9 +319,9 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
         of_packets([], tmp_path)
     with refusal("100 of them cut: record whole packets"):
         of_packets([(time, packet[:40]) for time, packet in packets], tmp_path)
-    with refusal("no recording of bus.kind ieee1394 is read; latencies in a CSV file are for busplan calibrate"):
+    with refusal("busplan reads no recordings of bus.kind ieee1394; latencies in a CSV file are for busplan calibrate"):
         of_packets(packets, tmp_path, plan="paper-4ms")
-    with refusal("no recording of bus.kind sercos3 is read$"):
+    with refusal("busplan reads no recordings of bus.kind sercos3$"):
         of_packets(packets, tmp_path, plan="sercos3-servo-8")
     with refusal("quantile 0.3: expected a share of 0.5 to 1"):
         of_packets(packets, tmp_path, quantile=0.3)
@@ -331,13 +331,13 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
     with refusal("cannot be read: No such file"):
         busplan.measured(PLAN, tmp_path / "nowhere.pcap")
     (tmp_path / "text.pcap").write_text("a,b\n1,2\n")
-    with refusal("text.pcap: is no pcap or pcapng file"):
+    with refusal("text.pcap: is not a pcap or pcapng file"):
         busplan.measured(PLAN, tmp_path / "text.pcap")
 
 
 def test_few_cycles_have_no_period(tmp_path: Path) -> None:
     answer = of_machine(Machine(), tmp_path, cycles=5)
-    assert answer.shows_nothing == ("it has 5 cycles, and a period takes 10",)
+    assert answer.shows_nothing == ("it has 5 cycles, but a period needs at least 10",)
     assert (figure(answer, "master's time").events, figure(answer, "master's time").verdict) == (5, "not shown")
 
 

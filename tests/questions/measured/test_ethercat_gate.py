@@ -384,7 +384,7 @@ def test_what_the_recorder_dropped_is_not_missing(tmp_path: Path) -> None:
 
 def test_few_cycles_show_nothing(tmp_path: Path) -> None:
     answer, codes = judged(simulated(MACHINE, 9), tmp_path)
-    assert answer.shows_nothing == ("it has 9 cycles, and a period takes 10",)
+    assert answer.shows_nothing == ("it has 9 cycles, but a period needs at least 10",)
     assert set(codes.values()) == {"BP403"}
     assert answer.edits == {}
     enough = replace(MACHINE, schedule=(cycle(128),))

@@ -143,7 +143,10 @@ def test_the_verdict_and_the_map_stand_before_all_that_is_folded() -> None:
 @pytest.mark.parametrize(
     ("profile", "words"),
     [
-        (changed(cycle__period_us=300.0), "NOT RUN, the cycle does not fit the bus: 263.320 us needed of 150.000 us."),
+        (
+            changed(cycle__period_us=300.0),
+            "NOT RUN, the cycle does not fit the bus: it needs 263.320 us of 150.000 us.",
+        ),
         (changed(servo__position_gain_per_s=1e5), "Not drawn: the position loop is unstable."),
         (changed(bus__nodes=5000), "The cycle is not drawn: bus.nodes = 5000: a timeline shows up to 1000 nodes"),
         (changed(circle__feed_mm_per_min=1e6), "The circle test cannot be run: circle.feed_mm_per_min = 1000000.0: "),

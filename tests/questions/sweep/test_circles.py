@@ -84,7 +84,7 @@ def test_the_first_point_that_cannot_be_run_is_named_before_any_is(beside: dict[
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"executor": ThreadPoolExecutor(1)}, "executor: goes with circle=True"),
+        ({"executor": ThreadPoolExecutor(1)}, "executor: needs circle=True"),
         ({"circle": True, "executor": 3}, "executor 3: expected a concurrent.futures.Executor"),
     ],
 )

@@ -78,5 +78,5 @@ def test_a_payload_that_the_axes_do_not_change_is_said_to_be_so(follows: bool) -
 
 def test_of_groups_it_is_said_which_one_varies() -> None:
     swept = busplan.sweep("gantry-24", vary={"cycle.period_us": [500, 1000]})
-    assert sentences_of(swept)[1] == "Axes are counted with more nodes of drives, the other groups as they are."
+    assert sentences_of(swept)[1] == "Axes are counted with more nodes of drives, with the other groups unchanged."
     assert shown(swept.report(), "group.drives.safe_nodes") == swept["group.drives.safe_nodes"].tolist()

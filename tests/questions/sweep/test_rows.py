@@ -119,7 +119,7 @@ def test_the_schema_says_what_the_rows_are_of(parquet: bytes) -> None:
     for name, unit in (("margin_us", b"us"), ("cycle.period_us", b"us"), ("max_axes", b"")):
         assert schema.field(name).metadata[b"unit"] == unit, name
     assert all(b"meaning" in field.metadata for field in schema if field.name not in VARY)
-    assert schema.field("max_axes").metadata[b"meaning"] == b"axes of the most nodes that fit"
+    assert schema.field("max_axes").metadata[b"meaning"] == b"axes of the largest number of nodes that fits"
 
 
 def test_truths_that_vary_are_truths() -> None:

@@ -99,7 +99,7 @@ def test_an_overrun_is_said_and_seen() -> None:
     said = "used 270 us of the 150 that the bus may use, 180 %; short by 120 us, +/- 6."
     assert lines[0] == f"paper-4ms at 300 us: does not fit by the standard model; {said}"
     paper = drawn(busplan.timeline(profile(cycle__period_us=300.0), timing_model="paper"))
-    said = "57.117 us short, 207.117 us needed of 150.000 us by the paper model, which does not affect the verdict."
+    said = "short by 57.117 us: needs 207.117 us of 150.000 us by the paper model, which does not affect the verdict."
     assert paper[0] == f"paper-4ms at 300 us: {said}"
     assert headline(one).state == "fails"
     over = row(lines, "over")
@@ -140,9 +140,9 @@ def test_the_table_says_what_takes_how_much_of_what() -> None:
     answers = (plan(), window(from_us=100.0, to_us=180.0), plan(cycle__period_us=300.0))
     tables = [block for one in answers for block in one.report().blocks if isinstance(block, Table)]
     assert [sentence_text(table.caption) for table in tables if table.caption] == [
-        "What takes the slice, 2000.000 us",
-        "What takes the window, 80.000 us",
-        "What takes the cycle, 263.320 us",
+        "Use of the slice, 2000.000 us",
+        "Use of the window, 80.000 us",
+        "Use of the cycle, 263.320 us",
     ]
     lines = drawn(plan())
     assert lines[-2].split() == [".", "subaction", "gap", "(10)", "4", "42.196", "2.11"]

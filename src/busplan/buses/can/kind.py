@@ -77,7 +77,7 @@ class Can(Bus):
         TimingModel(
             WORST,
             "as many stuff bits as a frame of its length can have",
-            error="this timing model takes 8 to 15% more than classical frames that were measured",
+            error="this timing model gives 8 to 15% more than measured classical frames",
         ),
         TimingModel(NONE, "no stuff bits"),
     )
@@ -120,7 +120,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     rate_keys = ("bus.bit_rate_kbit_s", "bus.data_bit_rate_kbit_s")
     constants = c
     keys: ClassVar[Mapping[str, Key]] = {
-        "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.nodes": Key(meaning="move the other nodes to a second bus"),
         "bus.access": Key(chooses=True, meaning="if the host's software can"),
         "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough"),
         "bus.data_bit_rate_kbit_s": Key("f_data", meaning="if transceivers and cable carry it"),

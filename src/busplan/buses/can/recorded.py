@@ -36,8 +36,8 @@ from busplan.recordings.can_timing import (
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, lateness, periodic_events, quantile
 
 _NOT_SHOWN: Final = (
-    "Not shown by a log: the bit rate, frames that the recorder did not take, when a frame was queued, commands that "
-    "are always late by whole periods, and the nodes' own time."
+    "A log does not show the bit rate, frames that the recorder missed, when a frame was queued, commands that are "
+    "always late by whole periods, or the nodes' own time."
 )
 _ROUNDING_US: Final = 1.0
 _CLASSICAL: Final = "classical CAN"
@@ -381,7 +381,7 @@ class _Log:
         yield from faults(frames, self.stretch)
         fd, switched = (int(np.count_nonzero(flags)) for flags in (frames.is_fd, frames.switched))
         if fd:
-            left = f", {switched:,} in no load: the plan has no data bit rate"
+            left = f", {switched:,} not counted in the load: the plan has no data bit rate"
             left = left if switched and not self.has_switch else ""
             yield f"{plural(fd, 'frame')} of CAN FD: in the load with half of the possible stuff bits{left}."
         if frames.remote:

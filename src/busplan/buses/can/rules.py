@@ -319,9 +319,9 @@ LIMITS: Final = (
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
         _pdos,
         lambda _network: c.MOST_NODES,
-        way_out="a second bus has {most:g} more",
+        way_out="a second bus has room for {most:g} more",
     ),
-    ExactLimit("payload", _payload_words, _largest_pdo, _least_room, way_out="a smaller payload would do"),
+    ExactLimit("payload", _payload_words, _largest_pdo, _least_room, way_out="use a smaller payload"),
     ExactLimit(
         "range",
         "identifier {value:.0f} is over {most:.0f}, the largest of {bus.identifier_bits} bits",

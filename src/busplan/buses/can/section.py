@@ -70,7 +70,8 @@ class CanBus(BusSection):
     )
     access: Access = Field(
         default="sync",
-        description="When nodes send: all at SYNC; each at a command of the host, which waits for its feedback before "
+        description="Time at which nodes send: all at SYNC; each at a command of the host, which waits for its "
+        "feedback before "
         "the next one (polled); or the same with all commands at once (burst). Robot motors know no SYNC",
         examples=["polled"],
     )
@@ -84,7 +85,7 @@ class CanBus(BusSection):
     )
     sync_jitter_us: TimeUs = Field(
         default=0.0,
-        description="How late the host may send SYNC, under the period: the cycle ends so much sooner [us]",
+        description="Largest delay of SYNC by the host, under the period; it shortens the cycle [us]",
         examples=[50],
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
@@ -100,7 +101,7 @@ class CanBus(BusSection):
         examples=[100],
     )
     host_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
-        default=None, description="How host_us is known", examples=["measured"]
+        default=None, description="Grade of host_us", examples=["measured"]
     )
     host_uncertainty_us: TimeUs | None = Field(
         default=None,
@@ -116,7 +117,7 @@ class CanBus(BusSection):
     )
     clock_tolerance: Annotated[float, Field(ge=0, le=0.0158, allow_inf_nan=False)] = Field(
         default=0.0,
-        description="How much longer than they should be the bits of the slowest oscillator are, a share 0..0.0158: a "
+        description="Largest excess of the bit time, that of the slowest oscillator, a share 0..0.0158: a "
         "doubt of cycle, load and responses",
         examples=[0.005],
     )
@@ -240,14 +241,14 @@ class CanMessage(Section):
     )
     period_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
         default=None,
-        description="How period_us is known; with an assumed one no plan is shown to fit",
+        description='Grade of period_us; with "assumed" no plan is shown to fit',
         examples=["assumed"],
     )
     burst: Count = Field(
         default=1, description="Frames that may come at once, with as many periods to the next", examples=[5]
     )
     jitter_us: TimeUs = Field(
-        default=0.0, description="How late it may be queued; may exceed the period [us]", examples=[500]
+        default=0.0, description="Largest delay of its queueing; may exceed the period [us]", examples=[500]
     )
     deadline_us: PeriodUs | Literal["none"] | None = Field(
         default=None,
@@ -306,7 +307,7 @@ class CanProfile(Profile):
         default_factory=lambda: CycleSection(period_us=MAX_TIME_US),
         description="The communication cycle; a network of messages alone has none",
     )
-    payload: CanPayload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    payload: CanPayload | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
     group: Annotated[tuple[CanGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
@@ -314,7 +315,7 @@ class CanProfile(Profile):
     message: Annotated[tuple[CanMessage, ...], Field(strict=False)] = Field(
         default=(), description="Other messages on the bus"
     )
-    limits: CanLimits = Field(default_factory=CanLimits, description="What the gate asks for beyond fitting")
+    limits: CanLimits = Field(default_factory=CanLimits, description="Requirements of the gate beyond fitting")
 
     @property
     def has_cycle(self) -> bool:

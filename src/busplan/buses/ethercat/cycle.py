@@ -51,7 +51,7 @@ EVENTS: Final = (
     EventKind("mailbox", "mailbox poll", FRAME, "b", "acknowledge"),
     EventKind("cable", "cable", "SOEM", "-", "sync"),
     EventKind("device", "device", "DC time stamps", "=", "work"),
-    EventKind("receive", "receiving again", "acontis", "<", "in"),
+    EventKind("receive", "reception", "acontis", "<", "in"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
 """Kinds of events in the order of the cycle."""
@@ -77,7 +77,7 @@ PREMISES: Final = (
     Premise("bus.master_us", "an instant master", 40.0),
     Premise("bus.master_jitter_us", "no jitter of the master", 20.0),
     Premise("bus.mailbox_polls", "no mailbox polls", 1),
-    Premise("node.cable_length_m", "no length of cables", 10.0),
+    Premise("node.cable_length_m", "cables of length 0", 10.0),
     Premise("node.delay_us", "usual delays of devices"),
     Premise("bus.master", "the frames of a usual master"),
     Premise("bus.process_data", "the frames of a usual master"),
@@ -170,7 +170,7 @@ class EthercatCycle(BusCycle):
         cables = BusEvent("cable", "cycle_cable_us", cables_us(self.network), "cables")
         hops = BusEvent("device", "cycle_devices_us", devices_us(self.network), "devices")
         yield Run((cables, hops), laid_out=lambda _: self._way())
-        yield BusEvent("receive", "cycle_receive_us", self._receive_us, "last frame again")
+        yield BusEvent("receive", "cycle_receive_us", self._receive_us, "reception of the last frame")
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
@@ -182,7 +182,7 @@ class EthercatCycle(BusCycle):
         return (
             *devices_doubts(self.network),
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
-            Doubt("bytes", "what a byte takes beyond the wire", self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US),
+            Doubt("bytes", "time of a byte beyond the wire", self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US),
         )
 
     def _frames(self) -> Iterator[BusEvent]:
@@ -233,7 +233,7 @@ class EthercatCycle(BusCycle):
         shown, number = ", ".join(names) or "no group", sum(len(cycle.numbers) for cycle in cycles)
         mean_us, given_us = self._mean_us, self._given_us
         return (
-            ("fullest cycle", f"has {shown}; {len(cycles[0].numbers)} of {number} cycles are so"),
+            ("fullest cycle", f"carries {shown}; {len(cycles[0].numbers)} of {number} cycles do"),
             ("mean cycle", f"{mean_us:.1f} us, {mean_us / given_us:.0%}".replace("%", " %")),
         )
 

@@ -231,7 +231,9 @@ def checked_hyperperiod(rates: Sequence[int]) -> int:
     cycles = lcm(*rates)
     if cycles > MOST_CYCLES:
         shown = ", ".join(map(str, sorted(set(rates))))
-        raise BusplanError(f"rates of {shown} meet every {cycles} cycles; {MOST_CYCLES} are looked through at most")
+        raise BusplanError(
+            f"the rates of {shown} repeat together only after {cycles} cycles; busplan computes at most {MOST_CYCLES}"
+        )
     return cycles
 
 

@@ -132,14 +132,14 @@ LIMITS: Final = (
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
         lambda network: reduce(larger, (data_bytes(group, network) for group in network.groups)),
         lambda network: room_bytes(datagrams(network)),
-        way_out="a smaller payload would do",
+        way_out="use a smaller payload",
     ),
     ExactLimit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
         lambda network: reduce(larger, (group.node.cable_length_m for group in network.groups)),
         lambda _network: c.MOST_CABLE_M,
-        way_out="a device in between would do",
+        way_out="put a device in between",
         place="node.cable_length_m",
     ),
     BeforeSync0(),
@@ -186,7 +186,7 @@ def _host(us: int, source: str) -> str:
     time = f"master_us = {us}".ljust(26)
     return f"""\
 {time} # assumed: {source}; measure it
-master_grade = "assumed"   # between nothing and twice its value"""
+master_grade = "assumed"   # between 0 and twice its value"""
 
 
 class Ethercat(Bus):
@@ -207,10 +207,10 @@ class Ethercat(Bus):
 kind = "ethercat"
 # master = "SOEM"          # or IgH, ethercrab, TwinCAT, acontis; of an unknown one the most bytes are taken
 distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
-# master_jitter_us = 20    # how late its frames may start: measure it under load; 0 is taken""",
+# master_jitter_us = 20    # latest start of its frames after the task: measure it under load; default 0""",
         node="""\
-# port = "E-bus"           # of terminals on a backplane; 100BASE-TX is taken
-# cable_length_m = 10      # from the device before it; 0 is taken
+# port = "E-bus"           # of terminals on a backplane; default 100BASE-TX
+# cable_length_m = 10      # from the device before it; default 0
 """,
         hosts={
             "hardware": _host(5, "a master in hardware or a kernel driver of its own: a few us"),
@@ -227,7 +227,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     stretch_kinds = STRETCHES
     constants = c
     keys: ClassVar[Mapping[str, Key]] = {
-        "bus.nodes": Key(meaning="the others on a second segment"),
+        "bus.nodes": Key(meaning="move the other devices to a second segment"),
         "bus.master_us": Key("T_master", role="host"),
         "bus.master_jitter_us": Key("J"),
         "bus.mailbox_polls": Key("polls"),
@@ -275,14 +275,14 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         """Perturbations: one more mailbox poll, a slower master, separate inputs and outputs, distributed clocks."""
         bus: Any = network.profile.bus
         return (
-            Perturbation("one mailbox poll more", {"bus.mailbox_polls": bus.mailbox_polls + 1}),
+            Perturbation("one more mailbox poll", {"bus.mailbox_polls": bus.mailbox_polls + 1}),
             Perturbation(f"master +{_MASTER_STEP_US:g} us", {"bus.master_us": bus.master_us + _MASTER_STEP_US}),
             Perturbation(
                 f"master's jitter +{_MASTER_STEP_US:g} us",
                 {"bus.master_jitter_us": bus.master_jitter_us + _MASTER_STEP_US},
             ),
             Perturbation(
-                "outputs and inputs in bytes of their own",
+                "separate bytes for inputs and outputs",
                 {_PROCESS_DATA: SEPARATE},
                 why_not="" if layout(network) == SHARED else "they are already",
             ),

@@ -166,7 +166,7 @@ class _Seen:
         """Reason why the recording has too few cycles for a period; empty where it has enough, or stamps in bursts."""
         if self.cycles is None or self.cycles.periods is not None or self.cycles.in_bursts:
             return ""
-        return f"{plural(len(self.cycles.first), 'cycle')}, and a period takes {LEAST_EVENTS}"
+        return f"{plural(len(self.cycles.first), 'cycle')}, but a period needs at least {LEAST_EVENTS}"
 
     def shows_nothing(self) -> tuple[str, ...]:
         """Reasons why the recording cannot show that the machine keeps its plan."""
@@ -393,7 +393,7 @@ class _Seen:
             why = f"has more than {MOST_PACKETS:,} packets, and goes on" if notes.is_long else "is cut or damaged"
             yield f"The file {why} from byte {notes.broken_at:,} on: read up to there."
         if self.steps_back:
-            yield (f"Its clock was set back {plural(self.steps_back, 'time')}: the longest stretch between is taken.")
+            yield (f"Its clock was set back {plural(self.steps_back, 'time')}: the longest stretch between is used.")
         if self.cycles is not None and self.cycles.left_out:
             yield (
                 f"{plural(self.cycles.left_out, 'frame')} of process data at its ends are left out: the master was "
@@ -415,8 +415,8 @@ class _Seen:
         yield from self.delays.remarks
         yield f"Stamps have steps of {self.stamp_us:g} us."
         yield (
-            "Not shown by a capture of the master's port: its time from the task to the stamp of a frame, SYNC0, and "
-            "the devices' own time."
+            "A capture of the master's port does not show its time from the task to the stamp of a frame, SYNC0, "
+            "or the devices' own time."
         )
 
     def edits(self) -> dict[str, object]:

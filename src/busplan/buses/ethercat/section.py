@@ -47,8 +47,8 @@ class EthercatBus(BusSection):
     )
     process_data: ProcessData | None = Field(
         default=None,
-        description="How process data travel: LRW-separate, in bytes of their own; LRW-shared, in the same bytes; "
-        "LRD-LWR, in two datagrams; without it by the master",
+        description="Datagrams of process data; LRW-separate: separate bytes for inputs and outputs; LRW-shared: "
+        "the same bytes; LRD-LWR: two datagrams; without it by the master",
         examples=[SEPARATE],
     )
     housekeeping_bytes: Annotated[tuple[HousekeepingBytes, ...], Field(strict=False)] | None = Field(
@@ -83,7 +83,7 @@ class EthercatBus(BusSection):
         examples=[30],
     )
     master_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
-        default=None, description="How master_us is known; the gate warns of assumed", examples=["measured"]
+        default=None, description='Grade of master_us; the gate warns of "assumed"', examples=["measured"]
     )
     master_uncertainty_us: TimeUs | None = Field(
         default=None,
@@ -91,7 +91,9 @@ class EthercatBus(BusSection):
         "else master_us / sqrt(3) [us]",
         examples=[5],
     )
-    master_jitter_us: TimeUs = Field(default=0.0, description="How late the frames may start [us]", examples=[20])
+    master_jitter_us: TimeUs = Field(
+        default=0.0, description="Latest start of the frames after the task [us]", examples=[20]
+    )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; for latency, and a loop on the host",
@@ -129,7 +131,8 @@ class EthercatNode(NodeSection):
     )
     sync_window_us: Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)] | None = Field(
         default=None,
-        description="How far a frame may move against SYNC0 from cycle to cycle before the device reports an error, up "
+        description="Largest movement of a frame against SYNC0 from cycle to cycle before the device reports an "
+        "error, up "
         "to the period; used only with distributed clocks [us]",
         examples=[50],
     )
@@ -151,7 +154,7 @@ class EthercatGroup(EthercatNode, GroupSection):
     )
     starts: Starts | None = Field(
         default=None,
-        description="What begins with the group: a datagram of its own, as of a domain of IgH, or a frame of its own, "
+        description="Start of the group: a datagram of its own, as of a domain of IgH, or a frame of its own, "
         "as of a task of TwinCAT; without it its data follow in the datagram of the group before",
         examples=["datagram"],
     )
@@ -183,7 +186,7 @@ class EthercatProfile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     bus: EthercatBus = Field(description="The bus")
-    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    payload: PayloadSection | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: EthercatNode | None = Field(default=None, description="One device, where nodes are alike")
     group: Annotated[tuple[EthercatGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"

@@ -65,7 +65,7 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
         return Sourced(us, unit="us", grade="derived", source=source, meaning=meaning, symbol=symbol)
 
     return ModelResidual(
-        sourced(spread.mean, "what half a transaction takes beyond the model, on the mean", "b"),
+        sourced(spread.mean, "mean time of half a transaction beyond the model", "b"),
         sourced(spread.uncertainty, "standard uncertainty of that for one more payload", "u(b)"),
     )
 

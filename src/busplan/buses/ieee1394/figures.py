@@ -68,7 +68,7 @@ TERMS: Final = (
     _term("acknowledge", _ACKNOWLEDGE, "all acknowledges of a cycle", "acknowledge", "K"),
     _term("hold", "profile", "bus held from acknowledges to concatenated responses", "response", "B"),
     _term("execution", "profile", "all execution of a cycle", "work", "E"),
-    _term("worst_extra", "profile", "what the slowest executions take beyond the execution time", "work", "X"),
+    _term("worst_extra", "profile", "time of the slowest executions beyond the execution time", "work", "X"),
     _term("idle", "idle", "all idle bus of the gaps, beside execution", "long-gap", "G"),
     _term("host", "profile", "the host's own time beyond the gaps", "contention", "H"),
     _term("retries", "profile", "busy retries of the longest request", "request", "T", key="{}_us"),
@@ -103,7 +103,7 @@ _LATENCIES: Final = _of_both(
 _LATENCIES_WITH_GAPS: Final = _of_both(
     "latency_with_gaps_us", "T_full,{}", _WITH_GAPS, "a {} and both gaps", "{} T_lant + T_sum"
 )
-_TRANSACTIONS: Final = _of_both("transaction_us", "T_{}", "idle", "what a {} takes of the cycle", "{} T_lant + idle")
+_TRANSACTIONS: Final = _of_both("transaction_us", "T_{}", "idle", "time of a {} in the cycle", "{} T_lant + idle")
 READS: Final = Figure(
     "reads_us", "T_r", "idle", "all reads of a cycle, with their gaps", "all reads T_r", better="less"
 )
@@ -115,7 +115,7 @@ _NODES_EQ11: Final = Figure(
     "N_11",
     by(eq.published_nodes),
     "number of nodes as published, at the profile's own N",
-    "nodes by the paper's (11)",
+    "nodes by equation (11)",
     "nodes",
     decimals=2,
 )
@@ -148,7 +148,7 @@ _PHASES: Final = (
         "T1+T2,15",
         by(eq.published_request_and_acknowledge_us),
         "first half as Table I's theory column has it: one hop, S400, gap count 63, payload of the transaction",
-        "T1+T2 by the paper's (15)",
+        "T1+T2 by equation (15)",
     ),
     Figure(
         "hold_us",
@@ -183,13 +183,11 @@ _PHASES: Final = (
     _RESET_GAP,
     _BOTH_GAPS,
     Figure("latency_with_gaps_us", "T_full", _WITH_GAPS, "the transaction and both gaps", "T_lant + T_sum"),
-    Figure(
-        "worst_extra_us", "T_extra", "profile", "what the slowest execution takes beyond T_exec", "slowest execution"
-    ),
+    Figure("worst_extra_us", "T_extra", "profile", "time of the slowest execution beyond T_exec", "slowest execution"),
     Figure("idle_us", "idle", "idle", "idle bus of the gaps, beside execution", "idle bus"),
     Figure("host_us", "host", "profile", "the host's own time beyond the gaps", "host"),
-    Figure("transaction_us", "T_trans", "idle", "what the transaction takes of the cycle", "takes of the cycle"),
-    Figure("all_us", "T_r or T_w", "idle", "all reads or all writes of the cycle", "all of the cycle, T_r or T_w"),
+    Figure("transaction_us", "T_trans", "idle", "time of the transaction in the cycle", "time in the cycle"),
+    Figure("all_us", "T_r or T_w", "idle", "all reads or all writes of the cycle", "whole cycle, T_r or T_w"),
 )
 """Phases in the order of the bench: T1+T2, T3, T4+T5, and the gaps after them."""
 LATENCY: Final = (TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COUNT, *_PHASES)

@@ -137,7 +137,7 @@ cycle_master = true        # assumed: an OHCI host sends cycle starts unless its
         measure="measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv{group} --apply",
         table="""\
 kind = "table"
-grade = "assumed"          # another machine's: between nothing and twice it
+grade = "assumed"          # another machine's: between 0 and twice it
 payload_bytes = [0, 4, 16, 32, 64, 128, 256, 512, 1024, 2048]   # 0 and 2048 are extrapolated
 time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
 """,
@@ -146,9 +146,9 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
     stretch_kinds = STRETCHES
     constants = c
     keys: ClassVar[Mapping[str, Key]] = {
-        "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.nodes": Key(meaning="move the other nodes to a second bus"),
         "bus.max_hops": Key(meaning="rewired as a tree"),
-        "bus.speed": Key(meaning="if all nodes can"),
+        "bus.speed": Key(meaning="if all nodes support it"),
         "bus.cable_length_m": Key(default="REFERENCE_CABLE_M", role="cable"),
         "cycle.slice_ratio": Key(default="SLICE_RATIO"),
         "cycle.schedule": Key(meaning="if the firmware of all nodes can"),
@@ -222,11 +222,11 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         is_chain = profile.bus.max_hops is None
         return (
             Perturbation(
-                "one hop more",
+                "one more hop",
                 {"bus.max_hops": int(hops_of(network)) + 1},
                 why_not="in a chain the hops follow the nodes" if is_chain else "",
             ),
-            Perturbation("one busy retry more", {"cycle.retries": profile.cycle.retries + 1}),
+            Perturbation("one more busy retry", {"cycle.retries": profile.cycle.retries + 1}),
             Perturbation(
                 f"host time +{_HOST_STEP_US:g} us",
                 {"host.transaction_us": profile.host.transaction_us + _HOST_STEP_US},

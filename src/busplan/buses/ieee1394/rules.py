@@ -56,7 +56,7 @@ class UnknownArbitration(Limit):
     """Limit of the arbitration above S400: its time is not published, so the cycle is a lower bound."""
 
     key = "arbitration"
-    way_out = "up to S400 all of it is known"
+    way_out = "up to S400 every time is known"
 
     def value(self, network: Network) -> Number:
         """1 above S400, else 0."""
@@ -84,7 +84,7 @@ LIMITS: Final = (
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         lambda network: network.largest_payload_bytes,
         _most_payload,
-        way_out="a faster bus or a smaller payload would do",
+        way_out="a faster bus or use a smaller payload",
         has_rule=True,
     ),
     nodes_limit("nodes", lambda: c.MAX_NODES, "bus", of="of one", has_rule=True),
@@ -108,21 +108,21 @@ LIMITS: Final = (
         "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         _of_broadcast(hub_block_bytes),
         _most_payload,
-        way_out=f"less read from each node, or {_ONE_BY_ONE}",
+        way_out=f"read less from each node, or {_ONE_BY_ONE}",
     ),
     ExactLimit(
         "write block",
         "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         _of_broadcast(write_block_bytes),
         _most_payload,
-        way_out=f"less written to each node, or {_ONE_BY_ONE}",
+        way_out=f"write less to each node, or {_ONE_BY_ONE}",
     ),
     ExactLimit(
         "cycle starts",
         "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
         _cycle_start_us,
         lambda _network: c.CYCLE_US - c.LEAST_ASYNCHRONOUS_US,
-        way_out="less bus.isochronous_us, or no cycle master, leaves time",
+        way_out="reduce bus.isochronous_us, or stop the cycle master",
     ),
     UnknownArbitration(),
     ExactLimit(
@@ -130,7 +130,7 @@ LIMITS: Final = (
         unsafe_words,
         safe_gap_count_of,
         gap_count_of,
-        way_out="for cables of more than {c.REFERENCE_CABLE_M:g} m none is known to be safe",
+        way_out="no gap count is known to be safe for cables over {c.REFERENCE_CABLE_M:g} m",
         role="safety",
     ),
 )
@@ -168,7 +168,7 @@ def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Problem where one bus has too few addresses for the nodes."""
     if "nodes" in subject.deciding.exceeded:
         key = subject.profile.node_groups[-1].nodes_key
-        yield RuleProblem(key, subject.limit_words("nodes"), "put the others on a second bus")
+        yield RuleProblem(key, subject.limit_words("nodes"), "move the other nodes to a second bus")
 
 
 def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -176,7 +176,7 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "hops" in subject.deciding.exceeded:
         is_chain = _bus(subject).max_hops is None
         key = subject.profile.node_groups[-1].nodes_key if is_chain else "bus.max_hops"
-        way_out = f"a tree with bus.max_hops = {c.MAX_HOPS:g} or less would do" if is_chain else "rewire the tree"
+        way_out = f"use a tree with bus.max_hops = {c.MAX_HOPS:g} or less" if is_chain else "rewire the tree"
         yield RuleProblem(key, subject.limit_words("hops"), way_out)
 
 
@@ -187,7 +187,7 @@ def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     for key, size in _payloads(subject):
         if size > most:
             faster = [speed for speed, limit in c.by_key("MAX_PAYLOAD_BYTES").items() if size <= limit]
-            way_out = f'bus.speed = "{faster[0]}" would do' if faster else "share it out among several transactions"
+            way_out = f'use bus.speed = "{faster[0]}"' if faster else "divide it among several transactions"
             yield RuleProblem(key, f"{size} bytes are over the {most} bytes of a packet at {speed}", way_out)
 
 
@@ -198,8 +198,8 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
             padded = padded_bytes(size)
             yield RuleProblem(
                 key,
-                f"{size} bytes are no whole number of quadlets; {padded} bytes travel anyway",
-                f"use or say {padded}",
+                f"{size} bytes are not whole quadlets; {padded} bytes travel on the wire",
+                f"set the payload to {padded}",
             )
 
 

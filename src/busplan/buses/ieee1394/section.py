@@ -120,7 +120,7 @@ class Sync(Section):
     )
     ping_per_node_us: TimeUs = Field(
         default_factory=lambda: float(c.PING_PER_NODE_US),
-        description="What each further node adds, measured; used by the paper model alone [us]",
+        description="Measured time per further node; used by the paper model alone [us]",
         examples=[0.1],
     )
 
@@ -194,13 +194,13 @@ class Ieee1394Node(NodeSection):
     )
     read_response: Literal["split", "concatenated"] = Field(
         default="split",
-        description="How a node answers a read: split, it arbitrates for its response; concatenated, the response "
+        description="Answer of a node to a read; split: it arbitrates for its response; concatenated: the response "
         "follows its acknowledge",
         examples=["split"],
     )
     write_response: Literal["split", "unified"] = Field(
         default="split",
-        description="How a node answers a write: split, it sends a response; unified, its acknowledge is the answer",
+        description="Answer of a node to a write; split: it sends a response; unified: its acknowledge is the answer",
         examples=["unified"],
     )
     response_us: _HoldUs = Field(
@@ -229,7 +229,7 @@ class Host(Section):
         default=0.0, description="The host's own time between a response and its next request [us]", examples=[5]
     )
     grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
-        default=None, description="How transaction_us is known", examples=["measured"]
+        default=None, description="Grade of transaction_us", examples=["measured"]
     )
     uncertainty_us: TimeUs | None = Field(
         default=None,
@@ -258,7 +258,7 @@ class Ieee1394Profile(Profile):
     host: Host = Field(default_factory=Host, description="The host that sends the requests")
     bus: Ieee1394Bus = Field(description="The bus")
     cycle: Ieee1394CycleSection = Field(description="The communication cycle")
-    payload: Ieee1394Payload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    payload: Ieee1394Payload | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
 
     def _problems(self) -> Iterator[Problem]:
         most, is_charged = self.bus.max_hops, self.bus.charge_hops == "own"

@@ -45,9 +45,7 @@ TERMS: Final = (
         ink="contention",
         letter="U",
     ),
-    Figure(
-        "cycle_retry_us", "T_retry", "profile", "requests that are repeated", "retries", ink="contention", letter="Y"
-    ),
+    Figure("cycle_retry_us", "T_retry", "profile", "repeated requests", "retries", ink="contention", letter="Y"),
     Figure(
         "cycle_host_us", "T_host", "profile", "the host between feedback and commands", "host", ink="work", letter="H"
     ),
@@ -87,8 +85,8 @@ PREMISES: Final = (
     Premise("bus.adapter_us", "no adapter", 1000.0),
     Premise("bus.retries", "no repeated requests", 1),
     Premise("bus.max_turn_bits", "answers as the protocol says"),
-    Premise("bus.reads", "one read a node", 2),
-    Premise("bus.writes", "one write a node", 2),
+    Premise("bus.reads", "one read per node", 2),
+    Premise("bus.writes", "one write per node", 2),
     Premise("", "no stuffed bytes", applies=lambda cycle: protocol_of(cycle.network.profile.bus).is_stuffed),
 )
 

@@ -48,14 +48,14 @@ LIMITS: Final = (
         "a telegram has {value:.0f} bytes of data, over {most:.0f}",
         _largest_bytes,
         lambda network: protocol_of(network.profile.bus).max_bytes,
-        way_out="a smaller payload would do",
+        way_out="use a smaller payload",
     ),
     ExactLimit(
         "range",
         "{value:g} kbit/s are over the {most:g} of the protocol",
         lambda network: network.profile.bus.bit_rate_kbit_s,
         lambda network: protocol_of(network.profile.bus).max_bit_rate_kbit_s,
-        way_out="a lower bit rate would do",
+        way_out="use a lower bit rate",
     ),
 )
 
@@ -84,7 +84,7 @@ class Polled(Bus):
         variants=_SECTIONS,
         period="10ms",
         measure="from the end of a request to the answer, less bus.return_delay_us",
-        base="what a node takes before it answers",
+        base="time of a node before it answers",
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
@@ -92,7 +92,7 @@ class Polled(Bus):
     constants = c
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.protocol": Key(chooses=True),
-        "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.nodes": Key(meaning="move the other nodes to a second bus"),
         "bus.bit_rate_kbit_s": Key("f", meaning="in every node"),
         "bus.requests": Key(chooses=True, meaning="if the host's software can"),
         "bus.return_delay_us": Key("t_delay", meaning="in every node"),
@@ -141,7 +141,7 @@ class Polled(Bus):
         no_timeout = "" if protocol_of(bus).has_token or bus.timeout_us is not None else "bus.timeout_us is not given"
         return (
             Perturbation("adapter +100 us", {"bus.adapter_us": bus.adapter_us + 100}),
-            Perturbation("one retry more", {"bus.retries": bus.retries + 1}, why_not=no_timeout),
+            Perturbation("one more retry", {"bus.retries": bus.retries + 1}, why_not=no_timeout),
         )
 
     def payloads(self, network: Network) -> PayloadRange:
@@ -153,7 +153,7 @@ class Polled(Bus):
         bus, way = network.profile.bus, PolledCycle(network, STANDARD).way
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
         asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]
-        adapter = (f"adapter {bus.adapter_us:g} us a request",) if bus.adapter_us else ()
+        adapter = (f"adapter {bus.adapter_us:g} us per request",) if bus.adapter_us else ()
         return (name, f"{bus.bit_rate_kbit_s:g} kbit/s", asked, *adapter)
 
 

@@ -42,7 +42,7 @@ class Protocol(Section):
     exchange_answer_bytes: Bytes = Field(default=0, description="Answer to it, without its data [bytes]", examples=[9])
     sync_read_bytes: Bytes = Field(default=0, description="Request that reads many nodes [bytes]", examples=[8])
     sync_write_bytes: Bytes = Field(default=0, description="Request that writes many nodes [bytes]", examples=[8])
-    sync_node_bytes: Bytes = Field(default=0, description="What either has for each node [bytes]", examples=[1])
+    sync_node_bytes: Bytes = Field(default=0, description="Each node's part of these requests [bytes]", examples=[1])
     global_bytes: Bytes = Field(
         default=0, description="Broadcast that may open a cycle, such as Global Control [bytes]", examples=[13]
     )
@@ -87,8 +87,8 @@ class PolledBus(BusSection):
     nodes: Count | None = Field(default=None, description="Nodes N, master not counted", examples=[14])
     requests: Requests | None = Field(
         default=None,
-        description="How nodes are asked: exchange, both ways in one request; sync, all nodes of a group in one; "
-        "single, one node one way; without it the first of these that the protocol has",
+        description="Way to ask the nodes; exchange: both ways in one request; sync: all nodes of a group in one; "
+        "single: one node one way; without it the first of these that the protocol has",
         examples=["sync"],
     )
     reads: Annotated[int, Field(ge=1, le=1000)] = Field(
@@ -99,7 +99,7 @@ class PolledBus(BusSection):
     )
     return_delay_us: TimeUs | None = Field(
         default=None,
-        description="Delay of an answer that is set in the nodes, beside node.execution; without it that of a new "
+        description="Delay of an answer set in the nodes, in addition to node.execution; by default that of a new "
         "node [us]",
         examples=[0],
     )
@@ -111,7 +111,7 @@ class PolledBus(BusSection):
     )
     clock_tolerance: Tolerance | None = Field(
         default=None,
-        description="How much longer or shorter than they should be all bits may be, a share 0..0.05: a doubt of the "
+        description="Largest error of the bit time, a share 0..0.05: a doubt of the "
         "cycle; 0 for exact clocks. Without it the protocol's; where that says nothing 0.005, assumed",
         examples=[0.0001],
     )
@@ -133,7 +133,7 @@ class PolledBus(BusSection):
     )
     timeout_us: TimeUs | None = Field(
         default=None,
-        description="How long the master waits for an answer that does not come; of PROFIBUS without it T_SL [us]",
+        description="Time that the master waits for an answer that does not come; of PROFIBUS without it T_SL [us]",
         examples=[2000],
     )
 

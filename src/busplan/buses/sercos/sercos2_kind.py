@@ -37,7 +37,7 @@ LIMITS: Final = (
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
         lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
         lambda _network: c.MOST_MDT_BYTES,
-        way_out="a smaller payload or a second ring would do",
+        way_out="use a smaller payload or a second ring",
     ),
 )
 
@@ -49,7 +49,7 @@ class Sercos2(SercosBus):
     title = "SERCOS I and II"
     also_called = ("SERCOS II", "SERCOS I", "SERCOS 1")
     timing_models = (
-        TimingModel(WORST, "a stuff bit after every five bits, the most there can be"),
+        TimingModel(WORST, "a stuff bit after every five bits, the worst case"),
         TimingModel(NONE, "no stuff bits"),
     )
     figures = FIGURES
@@ -67,7 +67,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     stretch_kinds = STRETCHES
     constants = c
     keys: ClassVar[Mapping[str, Key]] = {
-        "bus.nodes": Key(meaning="the others on a second ring"),
+        "bus.nodes": Key(meaning="move the other drives to a second ring"),
         "bus.data_rate_mbit_s": Key("f"),
         "bus.at_gap_us": Key("t_gap", grade="assumed"),
         "bus.at_start_us": Key("t_1"),

@@ -165,7 +165,7 @@ TERMS: Final = (
         "cycle_wait_us",
         "wait",
         _LIBRARY,
-        "what the devices make the AT wait",
+        "wait of the AT for the devices",
         "wait of devices",
         ink="sync",
         letter="W",

@@ -50,14 +50,14 @@ LIMITS: Final = (
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
         _largest_telegram,
         lambda _network: c.MOST_BYTES,
-        way_out="a smaller payload would do",
+        way_out="use a smaller payload",
     ),
     ExactLimit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
         _most_telegrams,
         lambda _network: c.MOST_TELEGRAMS,
-        way_out="a smaller payload or a second network would do",
+        way_out="use a smaller payload or a second network",
     ),
 )
 
@@ -87,7 +87,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     stretch_kinds = STRETCHES
     constants = c
     keys: ClassVar[Mapping[str, Key]] = {
-        "bus.nodes": Key(meaning="the others on a second network"),
+        "bus.nodes": Key(meaning="move the other devices to a second network"),
         "bus.gap_bytes": Key("gap", "DEFAULT_GAP_BYTES"),
         "bus.device_delay_us": Key("t_dev", "DEVICE_DELAY_US"),
         "bus.master_jitter_us": Key("J_master", "MASTER_JITTER_US"),

@@ -67,7 +67,7 @@ class Sercos3Bus(BusSection):
     )
     ring_grade: Literal["measured", "published", "assumed"] | None = Field(
         default=None,
-        description='How device_delay_us, master_jitter_us and gap_bytes are known; unless "measured", the '
+        description='Grade of device_delay_us, master_jitter_us and gap_bytes; unless "measured", the '
         "published ranges are their doubt",
         examples=["measured"],
     )

@@ -46,7 +46,7 @@ DELAYS: Final = (
         "slowest node: from its sample to its telegram, or from its command to the effect",
         "in the node",
     ),
-    Figure("before_us", "t_before", _CYCLE, "what the master and the cycle do before it", "before it in the cycle"),
+    Figure("before_us", "t_before", _CYCLE, "time of the master and of the cycle before it", "before it in the cycle"),
     Figure("telegrams_us", "t_tel", _CYCLE, "telegrams that carry it", "its telegrams"),
     Figure("ring_us", "t_ring", _CYCLE, "delay of the ring", "ring"),
     Figure("delay_us", "t", _CYCLE, "from sample to host, or from the start of the cycle to the effect", "delay"),

@@ -81,8 +81,8 @@ class Answer(ABC):
         drawing = first_drawing(self.report().blocks)
         if drawing is None:
             raise BusplanError(
-                "there is nothing to draw: this answer has no picture; those of timeline, map_, compare, circle_test, "
-                "and capacity with sensitivity=True have one"
+                "this answer has no picture; timeline, map_, compare, circle_test, and capacity with "
+                "sensitivity=True have one"
             )
         return drawing
 

@@ -100,7 +100,7 @@ def require_cycle(profile: Profile, *, question: str, instead: str = "") -> Prof
     if profile.has_cycle:
         return profile
     advice = instead or "capacity, latency, check, plan, sweep and diff judge messages"
-    raise BusplanError(f"{profile.name}: messages alone have no cycle, and {question} asks for one; {advice}")
+    raise BusplanError(f"{profile.name}: a network of messages alone has no cycle, which {question} needs; {advice}")
 
 
 def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:

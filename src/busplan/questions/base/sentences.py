@@ -92,7 +92,7 @@ def checked_against(tested: Tested, *, has_cycle: bool = True) -> str:
 
 def never_measured(tested: Tested) -> str:
     """Parts of a bus model that no published figure tests; without any figure, the whole cycle."""
-    return ", ".join(tested.untested) or ("" if tested.parts else "a whole cycle; no figure is published")
+    return ", ".join(tested.untested) or ("" if tested.parts else "a whole cycle (no published figures)")
 
 
 def reset_sentence(after: FitFigures | None) -> Iterator[Sentence]:
@@ -112,7 +112,7 @@ def margin_words(figures: FitFigures, broken_limits: Iterable[str]) -> tuple[Par
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
     reasons = [Sentence((words,)) for words in broken_limits]
     if TIME in figures.exceeded:
-        reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
+        reasons.append(sentence("short by {}: needs {} of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
 
 

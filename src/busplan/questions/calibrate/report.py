@@ -79,8 +79,8 @@ def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
     yield sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
     if answer.unchecked_bytes:
         sizes = ", ".join(map(str, answer.unchecked_bytes))
-        words = f"it takes {REPETITIONS_TO_COMPARE} measurements of a payload"
-        yield sentence(f"No outlier can be told at {sizes} bytes: {words}.")
+        words = f"that needs {REPETITIONS_TO_COMPARE} measurements of a payload"
+        yield sentence(f"Outliers cannot be found at {sizes} bytes: {words}.")
     yield from (joined(sentence("Warning: ", state="warns"), warning, by="") for warning in warned)
     absent = {"left_out"} if not answer.outliers else set()
     if all(fit.deviation_us is None for fit in answer.payloads):
@@ -127,14 +127,14 @@ def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
     for size in sizes:
         if not execution.covers(size):
             yield sentence(
-                f"the profile's payload of {{}} is outside what was measured, {execution.range_bytes}: measure it.",
+                f"the profile's payload of {{}} is outside the measured range, {execution.range_bytes}: measure it.",
                 ShownValue(size, "payload_bytes", "bytes"),
             )
     short = [fit for fit in answer.payloads if fit.execution_us <= answer.at_most_us]
     if short:
         yield sentence(
-            "the bus waits {} before any response, so a shorter execution cannot be told from a latency: T_exec is "
-            f"at most that at {', '.join(str(fit.payload_bytes) for fit in short)} bytes.",
+            "the bus waits {} before any response, so shorter executions do not show in a latency: T_exec may be "
+            f"less at {', '.join(str(fit.payload_bytes) for fit in short)} bytes.",
             time_value(answer.at_most_us, "at_most_us"),
         )
     longest_us = max(fit.execution_us for fit in answer.payloads)
@@ -158,7 +158,7 @@ def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> Sentence:
         parts.append(sentence("; left out: measure again."))
     else:
         worst = time_value(worst_us, "worst_extra_us")
-        parts.append(sentence("; left out: the slowest execution takes {} more, worst_extra_us.", worst))
+        parts.append(sentence("; left out. The slowest execution takes {} longer, worst_extra_us.", worst))
     return joined(*parts, by="")
 
 

@@ -138,7 +138,7 @@ def capacity(
     (False, 'does not fit')
     >>> (sensitivity,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
     >>> [(effect.change, round(effect.margin_change_us, 1)) for effect in sensitivity.effects[:2]]
-    [('one node more', -128.1), ('one busy retry more', -28.0)]
+    [('one more node', -128.1), ('one more busy retry', -28.0)]
     >>> sensitivity.next_bottleneck.next_binding_term.name
     'idle'
     """

@@ -130,8 +130,8 @@ def _state(row: Figure, values: Mapping[str, Any]) -> State:
 def _rests_on_table(verdict: Verdict) -> Table:
     """What the profile does not give and the verdict takes for granted."""
     rows = (TableRow((part.words, Code(part.key) if part.key else "none")) for part in verdict.rests_on)
-    columns = TableColumn("taken", kind="words"), TableColumn("key that gives it", kind="words")
-    return Table(columns, tuple(rows), Sentence(("What the verdict rests on, as the profile does not give it",)))
+    columns = TableColumn("premise", kind="words"), TableColumn("key", kind="words")
+    return Table(columns, tuple(rows), Sentence(("Premises of the verdict that the profile does not give",)))
 
 
 def _groups_table(answer: CapacityAnswer) -> Table:
@@ -153,7 +153,7 @@ def _groups_table(answer: CapacityAnswer) -> Table:
         head = (Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes"))
         cells = (attribute_value(column, figures.groups[place]) for figures, chosen in shown for column in chosen)
         rows.append(TableRow((*head, *cells)))
-    return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
+    return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, with the other groups unchanged",)))
 
 
 def _change_record(change: Change) -> Record:

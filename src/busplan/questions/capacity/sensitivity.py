@@ -145,14 +145,14 @@ def _slower(network: Network) -> Perturbed:
 def _one_node_more(network: Network, group: ProfileGroup) -> Perturbed:
     more = group.nodes + 1
     grown = network.varying(group.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, grown, "")
+    return Perturbed(f"one more node{_in(group)}", group.nodes_key, group.nodes, more, grown, "")
 
 
 def _one_axis_more(network: Network, group: ProfileGroup) -> Perturbed:
     key, axes = group.node_key("axes"), group.node.axes + 1
     grown, unknown = _if_known(lambda: trial(network, {key: axes}))
     note = unknown or ("" if group.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(group)}", key, axes - 1, axes, grown, note)
+    return Perturbed(f"one more axis per node{_in(group)}", key, axes - 1, axes, grown, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:

@@ -114,7 +114,7 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
         yield Chart(drawn, Sentence((f"{change} moves the margin most; {sides}, in us",)))
     yield _headline(sensitivity)
     if notes := tuple(Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note):
-        yield Detail(notes, "why some changes do nothing here")
+        yield Detail(notes, "why some changes have no effect")
     yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.now.bus_figures)
     if sensitivity.reaches:
         yield _reaches_table(sensitivity.reaches)
@@ -169,7 +169,7 @@ def _then_value(effect: Effect) -> ShownValue:
 def _reaches_table(reaches: Sequence[Reach]) -> Table:
     """How far each quantity may grow."""
     columns = (
-        TableColumn("what grows alone", kind="words"),
+        TableColumn("quantity", kind="words"),
         TableColumn("now"),
         TableColumn("up to"),
         TableColumn("then broken", kind="words"),
@@ -185,7 +185,7 @@ def _reaches_table(reaches: Sequence[Reach]) -> Table:
         )
         for reach in reaches
     )
-    return Table(columns, tuple(rows), Sentence(("How far until a limit breaks",)))
+    return Table(columns, tuple(rows), Sentence(("Largest value of each quantity alone before a limit breaks",)))
 
 
 def _step(effect: Effect) -> Cell:
@@ -278,8 +278,8 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> Se
         )
         of_term = sentence(text, us, next_us, margin)
     else:
-        then = f"which no key takes away, comes {next_label}, {{}}"
-        of_term = sentence(f"Next bottleneck: after {label}, {{}}, {then}", us, next_us)
+        then = f"the next term is {next_label}, {{}}"
+        of_term = sentence(f"Next bottleneck: no key removes {label}, {{}}; {then}", us, next_us)
     return joined(joined(of_term, *map(_limit, bottleneck.limits), by="; "), Sentence((".",)), by="")
 
 

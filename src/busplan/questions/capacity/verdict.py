@@ -369,7 +369,9 @@ def _more(count: GroupCapacity, number: int) -> str:
     """How many more nodes of a group, or of all, are shown to fit, and their axes."""
     if count.name:
         axes = (count.safe_axes or 0) - count.axes
-        return f"{number:,} more of {count.name}" + (f" ({plural(axes, 'axis')})" if axes else "")
+        return f"{number:,} more {nouns(number, 'node')} of {count.name}" + (
+            f" ({plural(axes, 'axis')})" if axes else ""
+        )
     in_all = [
         plural(number, noun) for number, noun in ((count.safe_nodes, "node"), (count.safe_axes, "axis")) if number
     ]
@@ -433,7 +435,7 @@ def _details(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Lin
     """What the answer needs only when somebody asks: the correction, the published figures, other models."""
     figures = verdict.deciding
     if figures.bias_us:
-        words = "in what is used: measured buses take so much longer than the timing model"
+        words = "included in used: measured buses take this much longer than the timing model"
         yield "correction", Sentence((f"{known_text(figures.bias_us, None)} us {words}",))
     elif network.groups and figures.bias_us is None:
         (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
@@ -450,7 +452,7 @@ def _caveats(verdict: Judged) -> Iterator[_Line]:
         if contradicts(other.fits, deciding):
             needed_us = known_text(other.required_us, deciding.uncertainty_us)
             words = (
-                f"says otherwise, {needed_us} us needed of {known_text(other.available_us, None)}, but does not decide"
+                f"says otherwise: needs {needed_us} us of {known_text(other.available_us, None)}; it does not decide"
             )
             yield f"{other.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:

@@ -128,8 +128,8 @@ class ErrorRange(NamedTuple):
     def zero_outside(self) -> str:
         """Note that zero is outside of the scale; empty if it is inside."""
         if self.bottom_um > 0:
-            return "0 lies below"
-        return "0 lies above" if self.top_um < 0 else ""
+            return "zero is below the scale"
+        return "zero is above the scale" if self.top_um < 0 else ""
 
 
 def error_range(low_um: float, high_um: float) -> ErrorRange:
@@ -158,8 +158,8 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
     rings.append((1.0, Entry("nominal", "nominal circle", shape="line")))
     if scale.tolerance_mm is not None:
         rings += [(scale.radius(error), TOLERANCE) for error in (-scale.tolerance_mm, scale.tolerance_mm)]
-    path = Entry("first", "path, its error magnified", shape="line")
-    return Dial(path, low, high, tuple(rings), (scale.ring_text, "a ring"), direction == "cw")
+    path = Entry("first", "path with magnified error", shape="line")
+    return Dial(path, low, high, tuple(rings), (scale.ring_text, "per ring"), direction == "cw")
 
 
 class _Row(NamedTuple):
@@ -231,7 +231,7 @@ def _circle(row: _Row, scales: _Scales) -> Panel:
     result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
     deviation = _measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
-    whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
+    whole = "G: not defined on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
     words = f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}"
     plot = None
     if scale is not None and row.shape.contour is not None:
@@ -246,7 +246,7 @@ def _shown(row: _Row, scales: _Scales) -> str:
     if scales.circle is None:
         return "no contour error"
     times = decimals_of(scales.circle.magnification(row.result.radius_mm), 0)
-    return f"{scales.circle.ring_text} a ring, {times} times magnified"
+    return f"rings every {scales.circle.ring_text}; error magnified {times} times"
 
 
 def _measure_text(value_mm: float | None, limit_mm: float | None, scales: _Scales) -> str:
@@ -282,7 +282,7 @@ def _curve(part: ErrorPart, up: Ruler, row: _Row, *, per_um: float) -> Curve:
             "first", "measured: one whole turn" if is_turn else "measured: arc at constant speed", shape="line"
         )
     else:
-        words = "the rest: lead-in and ramps" if is_turn else "the rest: ramps and settling"
+        words = "not measured: lead-in and ramps" if is_turn else "not measured: ramps and settling"
         entry = Entry("apart", words, shape="line")
     return Curve(entry, tuple(zip(part.time_s.tolist(), errors.tolist(), strict=True)))
 
@@ -305,5 +305,5 @@ def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
         lanes.append(Lane(source.source.replace("_", " "), (bar,), note, is_thin=True))
     low, high = min(0.0, *taken), max(0.0, *taken)
     scale = numbers(unit.name, low, high if high > low else low + 1.0)
-    title = "Each error source removed in turn: taken from the largest error"
+    title = "Increase of the largest error by each source"
     return Panel(Lanes(scale, tuple(lanes), (Guide(Entry("zero"), x=0.0),)), title)

@@ -59,10 +59,10 @@ class _Message(NamedTuple):
 
 _FAILURES: Final[dict[str, _Message]] = {
     "required_us": _Message(
-        "the cycle does not fit the bus: {value} needed of {limit}", "us", limit_key="available_us", limit_decimals=3
+        "the cycle does not fit the bus: it needs {value} of {limit}", "us", limit_key="available_us", limit_decimals=3
     ),
     "safe_required_us": _Message(
-        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve {value} needed of {limit}",
+        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve it needs {value} of {limit}",
         "us",
         limit_key="available_us",
         limit_decimals=3,
@@ -70,7 +70,7 @@ _FAILURES: Final[dict[str, _Message]] = {
     "stability": _Message("the position loop is unstable"),
     "circle_not_followed": _Message(
         "the table did not follow the circle (not the whole turn, or an error above the radius): "
-        "it went {value} of {limit} round the centre",
+        "it covered {value} of {limit} around the centre",
         "deg",
         0,
         key="covered_deg",
@@ -87,7 +87,7 @@ _FAILURES: Final[dict[str, _Message]] = {
     ),
     _WITHOUT_TURN: _Message(
         "the circular deviation G is measured on a whole turn, and the path is a trapezoid: "
-        'set circle.path = "iso230-4", or take out tolerance.circular_deviation_mm = {limit}',
+        'set circle.path = "iso230-4", or remove tolerance.circular_deviation_mm = {limit}',
         limit_unit="mm",
     ),
     "circular_deviation_mm": _Message("the circular deviation G of {value} is {beyond} over its {limit}"),

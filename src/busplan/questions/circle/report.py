@@ -58,7 +58,7 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
         none = Words("no error source of this profile matters", verdict.state)
         labels = [CIRCLE_BY_KEY[key].label for key in telling_measures(profile)]
         least = f"{listed(labels, 'and')} below {NEGLIGIBLE_MM * 1e3:g} um"
-        words = f"; {least}, which says nothing of how round a machine is{_are_zero(profile)}."
+        words = f"; {least}, so the test says nothing about the roundness of a machine{_are_zero(profile)}."
         yield Sentence((*subject, ": ", none, words), verdict.state)
     else:
         yield Sentence((*subject, ": ", *_unjudged(profile, result), "."), verdict.state)
@@ -112,7 +112,7 @@ def _attack(result: CircleFigures) -> Iterator[Sentence]:
             ShownValue(removed_mm, "removed_mm", "um", 3),
         )
     elif result.contributions is not None:
-        yield Sentence((f"No single error source of the profile explains the {label}.",))
+        yield Sentence((f"No error source of the profile, when removed, reduces the {label}.",))
 
 
 def _setup_values(result: CircleFigures) -> tuple[ShownValue, ShownValue]:
@@ -151,7 +151,7 @@ _SHOWN: Final = (
 _HOST_ROWS: Final = ("update", "delay_us")
 """Rows of the table for loops on the host alone."""
 ACT_TOGETHER: Final = Sentence(
-    ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
+    ("Sources interact: their increases need not add up. A source with a negative one hides another.",)
 )
 _LEAST_FALL_MM: Final = 1e-6
 NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
@@ -197,7 +197,7 @@ def _falling(test: CircleTestAnswer) -> Iterator[Sentence]:
             inside_mm = chord_mm**2 / (8 * after.radius_mm)
             yield sentence(
                 "The largest contour error falls from {} to {}: between set-points the path is a chord, up to {} "
-                "inside the circle, and the ramp has circle.ramp_periods periods, so it is gentler; both take from an "
+                "inside the circle, and the ramp has circle.ramp_periods periods, so it is gentler. Both reduce an "
                 "error outside the circle.",
                 period_value(before.period_us),
                 period_value(after.period_us),
@@ -222,20 +222,20 @@ def _contributions_table(result: CircleFigures) -> Table:
     least, most = min((0.0, *removed)), max((0.0, *removed))
     rows = []
     for source in ranked:
-        takes = ShownValue(source.removed_mm, "removed_mm", "um", 3, signed=True)
+        added = ShownValue(source.removed_mm, "removed_mm", "um", 3, signed=True)
         left = (
             attribute_value(CIRCLE_BY_KEY[key], source) for key in ("max_contour_error_mm", "circular_deviation_mm")
         )
-        rows.append(TableRow((source.words, Bar(takes, least, most) if most > least else "", takes, *left)))
+        rows.append(TableRow((source.words, Bar(added, least, most) if most > least else "", added, *left)))
     columns = (
         TableColumn("source", kind="words"),
         TableColumn("", kind="drawing"),
-        TableColumn("takes", "um"),
+        TableColumn("adds", "um"),
         TableColumn("max", "um", group="without it"),
         TableColumn("G", "um", group="without it"),
     )
     caption = sentence(
-        "Each error source removed in turn at {} and {}; what it takes from the largest contour error",
+        "Increase of the largest contour error by each source, at {} and {}",
         *_setup_values(result),
     )
     return Table(columns, tuple(rows), caption)
@@ -264,7 +264,7 @@ def _circle_chart(contour: ContourProfile | None, result: CircleFigures, profile
         else sentence("the tolerance of {} dashed.", tolerance)
     )
     times = sentence(
-        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start of "
+        "Magnified {} times; rings every {}; bold: the nominal circle; the dot is the start of "
         "the turn, the arrow its direction; ",
         ShownValue(scale.magnification(result.radius_mm), decimals=0),
         ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),

@@ -92,9 +92,9 @@ def _blocks(answer: CompareAnswer) -> Iterator[Block]:
     yield summary
     yield from _best(answer)
     if answer.counted:
-        yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(answer.counted))
+        yield sentence("Axes are counted with more nodes of {}, with the other groups unchanged.", Code(answer.counted))
     if any(not machine.is_own for machine in answer.compared):
-        words = "On another kind than its own the machine has the bus of a new profile, which is assumed."
+        words = "On other kinds of bus the machine has the bus of a new profile, with assumed values."
         yield Sentence((words,), "warns")
     yield Table(_COLUMNS, tuple(map(_row, answer.kinds)), Sentence(("The machine on each kind of bus",)))
     if answer.compared:
@@ -124,7 +124,7 @@ def _headline(answer: CompareAnswer) -> Sentence:
     words = [] if own is None else [f"{own.figures.verdict} on {own.title}, its own bus"]
     if len(answer.kinds) > (own is not None):
         words.append(
-            f"with what is assumed of other buses, shown to fit on {listed(others, 'and') if others else 'none'}"
+            f"with assumed values of other buses, shown to fit on {listed(others, 'and') if others else 'none'}"
         )
     return sentence(
         f"{{}} at {{}}: {'; '.join(words)}.",
@@ -195,7 +195,7 @@ def _hindrance(machine: MachineOnKind | NotOnKind) -> Sentence | None:
         sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(machine.broken_limits)}.",)))
     if not machine.safe.nodes:
         at = period(figures.period_us)
-        sentences.append(Sentence((f"Not one node is shown to fit {at}, limited by {machine.safe.limited_by}.",)))
+        sentences.append(Sentence((f"No node is shown to fit {at}, limited by {machine.safe.limited_by}.",)))
     if machine.smallest.us is None:
         sentences.append(Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",)))
     sentences += reset_sentence(machine.after_reset)

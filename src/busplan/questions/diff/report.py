@@ -122,8 +122,8 @@ def _sentence(answer: DiffAnswer) -> Sentence:
 def _verdict(side: DiffSide) -> str:
     word = side.verdict or ""
     buts = [
-        *([] if side.deciding.safe else [f"its {side.deciding.safety.setting} is not safe"]),
-        *([f"it misses {listed(side.missed_limits, 'and')}"] if side.missed_limits else []),
+        *([] if side.deciding.safe else [f"{side.deciding.safety.setting} is unsafe"]),
+        *([f"it does not meet {listed(side.missed_limits, 'and')}"] if side.missed_limits else []),
     ]
     verdict = word if word in (FITS, DOES_NOT_FIT) else f"is {word}"
     return f"{verdict}{', but' if word == FITS else ', and'} {' and '.join(buts)}" if buts else verdict

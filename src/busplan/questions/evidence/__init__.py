@@ -101,7 +101,7 @@ class Row(Section):
     @model_validator(mode="after")
     def _is_graded(self) -> Self:
         if (self.published is None) != (self.grade is None):
-            raise ValueError("a published figure has a grade, and nothing else has")
+            raise ValueError("a published figure needs a grade; a computed one has none")
         return self
 
 
@@ -316,7 +316,7 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     ('8 bytes, 11 bits of identifier, worst stuffing', 135, 135.0, 'published')
     """
     if paper and kind is not None:
-        raise BusplanError(f"kind {kind!r}: goes without paper=True, which is of one kind")
+        raise BusplanError(f"kind {kind!r}: cannot be used with paper=True, which is of one kind")
     if kind not in (None, *kind_names()):
         raise BusplanError(f"{kind}: no such kind of bus; there are {', '.join(kind_names())}")
 

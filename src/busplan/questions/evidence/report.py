@@ -31,7 +31,7 @@ _RESIDUAL_DECIMALS: Final = 4
 def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Report:
     """Report of `evidence`, kind by kind; the report of `paper` has only the tables of its one kind."""
     records = _records(kinds, paper=paper)
-    title = "Published figures beside" if paper else "What others have published or measured, beside"
+    title = "Published figures and" if paper else "Published or measured figures and"
     return Report(
         Sentence((f"{title} computed {'ones' if paper else 'figures'}",)),
         tuple(_blocks(kinds, paper=paper)),
@@ -105,7 +105,7 @@ def _summary(kind: KindEvidence) -> Table:
         TableColumn("least", "%", group="residual"),
         TableColumn("most", "%", group="residual"),
     )
-    return Table(columns, tuple(rows), Sentence(("How far computed figures are from published ones",)))
+    return Table(columns, tuple(rows), Sentence(("Deviation of computed from published figures",)))
 
 
 def _table(comparisons: Sequence[Comparison]) -> Table:

@@ -121,7 +121,7 @@ def explain(
         given = {"period_us": period_us, "timing_model": timing_model, "transaction": transaction}
         names = [name for name, value in given.items() if value is not None]
         if names:
-            raise BusplanError(f"{listed(names, 'and')}: goes with a figure, as busplan explain PROFILE required_us")
+            raise BusplanError(f"{listed(names, 'and')}: needs a figure, as in busplan explain PROFILE required_us")
         return ExplainAnswer(
             network.profile,
             assumptions=assumptions(network),

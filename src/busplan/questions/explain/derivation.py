@@ -154,7 +154,7 @@ def _existing(value: object) -> object:
 def _why_none(network: Network, meant: Wanted, timing_models: Sequence[str] | None) -> str:
     figure, deciding = meant.figures[0], network.bus.deciding_model
     if timing_models is not None and figure in CERTAINTY and deciding not in timing_models:
-        return f"{figure.key}: belongs to the timing model that decides and to no other, {deciding}"
+        return f"{figure.key}: exists only in the timing model that decides, {deciding}"
     if (meant.command, figure) in explained_figures(network):
         return f"{figure.key}: does not exist under this timing model, or for this transaction"
     return (

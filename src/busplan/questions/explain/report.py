@@ -55,7 +55,7 @@ _FIGURES: Final = (
     *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
     TableColumn("eq", kind="words", rank=2),
     TableColumn("unit", kind="words", rank=1),
-    TableColumn("what it is", kind="words", wraps=True),
+    TableColumn("meaning", kind="words", wraps=True),
 )
 
 
@@ -70,7 +70,7 @@ def assumptions_report(answer: ExplainAnswer) -> Report:
         TableRow((command, Code(figure.key), figure.reference, figure.unit, figure.meaning))
         for command, figure in figures
     )
-    caption = Sentence(("What the verdict on ", Code(profile.name), " rests on, the least well known first"))
+    caption = Sentence(("Inputs of the verdict on ", Code(profile.name), ", the least certain first"))
     records = [
         {"command": command, "figure": figure.key, **fields(figure, "symbol", "unit", "reference", "meaning")}
         for command, figure in figures
@@ -81,7 +81,7 @@ def assumptions_report(answer: ExplainAnswer) -> Report:
         Sentence(("The figures of ", Code(profile.name))),
         (
             Table((*_KNOWN, _MEANING), tuple(inputs), caption, stacks=True),
-            Detail((table,), "what each figure is", (Sentence((f"Figures to explain: {', '.join(names)}.",)),)),
+            Detail((table,), "meanings of the figures", (Sentence((f"Figures to explain: {', '.join(names)}.",)),)),
         ),
         document(
             "explain",
@@ -99,7 +99,7 @@ def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:
     """Report of `explain PROFILE FIGURE`, with a section for each of one or more derivations."""
     figures = dict.fromkeys(derivation.figure.key for derivation in derivations)
     return Report(
-        Sentence(("Where ", Code(", ".join(figures)), " of ", Code(name), " comes from")),
+        Sentence(("Derivation of ", Code(", ".join(figures)), " in ", Code(name))),
         tuple(_sections(name, derivations)),
         document("explain", profile=name, derivations=list(map(_record, derivations))),
         with_profile(name, [record for derivation in derivations for record in _step_records(derivation)]),
@@ -138,7 +138,7 @@ def _sections(name: str, derivations: Iterable[Derivation]) -> Iterator[Chapter]
     first: dict[tuple[Input, ...], Derivation] = {}
     for derivation in derivations:
         earlier = first.setdefault(derivation.inputs, derivation)
-        same = f"It starts from the same inputs as {earlier.figure.key}, {_of(earlier)}."
+        same = f"Inputs: as for {earlier.figure.key}, {_of(earlier)}."
         yield _section(derivation, name, _inputs(derivation) if earlier is derivation else Sentence((same,)))
 
 
@@ -181,7 +181,7 @@ def _last_step(derivation: Derivation) -> Iterator[Block]:
     known = (given for given in derivation.inputs if given.grade in GRADES[:-1] and _plays_a_part(given, derivation))
     weak = sorted(known, key=lambda given: GRADES.index(given.grade))[:_MOST_INPUTS]
     rows = (TableRow((Code(given.symbol), *_input_cells(given))) for given in weak)
-    caption = Sentence((f"Inputs, the least well known first; the weakest grade is {derivation.weakest_grade}",))
+    caption = Sentence((f"Inputs, the least certain first; the weakest grade is {derivation.weakest_grade}",))
     yield Table((_SYMBOL._replace(leaves="out"), *_KNOWN), tuple(rows), caption)
 
 

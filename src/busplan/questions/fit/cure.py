@@ -468,7 +468,7 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
             for group, of_group in needed.items()
             if of_group > 0
         )
-        instead = f"say instead: {ways}" if ways else "set the nodes of a group instead"
+        instead = f"instead {ways}" if ways else "set the nodes of a group instead"
         raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
     (group,) = profile.node_groups
     return ceil(axes / int(group.node.axes))

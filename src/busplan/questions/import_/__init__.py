@@ -156,7 +156,7 @@ def import_profile(
         can.assume_periods(machine, finite(period_us, name="period_us"))
     if bit_rate_kbit_s is not None:
         if machine.kind != "can":
-            raise BusplanError(f"bit rate {bit_rate_kbit_s:g}: the files are of no CAN bus")
+            raise BusplanError(f"bit rate {bit_rate_kbit_s:g}: only for a CAN bus; these files are of none")
         can.give_bit_rate(machine, finite(bit_rate_kbit_s, name="bit_rate_kbit_s"))
     title = name or ("machine" if names[0] == "-" else Path(names[0]).stem)
     rows = list(_ROWS[machine.kind](machine))
@@ -179,7 +179,7 @@ def _require_files(readings: Sequence[Reading], *, bus: str | None, channel: str
     described = [reading.file for reading in readings if reading.nodes and reading.kind == "can"]
     if has_nodes and len(described) != 1:
         found = f"{described[0]} and {described[1]} are both" if described else "none of the files is"
-        raise BusplanError(f"nodes: {found} an EDS; it says of which nodes one EDS is")
+        raise BusplanError(f"nodes: {found} an EDS; --nodes needs exactly one")
     logs = [reading.file for reading in readings if reading.is_log]
     if channel is not None and not logs:
         raise BusplanError(f"channel {channel}: none of the files is a CAN log")
@@ -200,7 +200,7 @@ def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
         f"with the most stuff bits; {fullest.seconds:,} of its {fullest.of_seconds:,} s have frames"
     )
     if planned > can.MOST_OF_FULLEST * recorded:
-        words += ". It is so much more because messages of the log come at different times, and in a plan they may meet"
+        words += ". The plan is higher because it lets messages coincide that the log has at different times"
     return words
 
 

@@ -81,12 +81,12 @@ def timing_facts(model: "EventModel", period_us: float, place: str, *, is_period
     """Jitter and burst of a message by a log; and that it has no deadline, where that is not its period."""
     burst, jitter_us = model
     if jitter_us:
-        note = "of the arrival, the wait for other frames in it" if is_periodic else "the soonest after another"
+        note = "of the arrival, waiting for other frames included" if is_periodic else "the soonest after another"
         yield "jitter_us", Fact(jitter_us, place, "measured", note)
     if burst > 1:
-        yield "burst", Fact(burst, place, "measured", "so many come together")
+        yield "burst", Fact(burst, place, "measured", "largest burst")
     if not is_periodic or burst > 1 or jitter_us > _MOST_JITTER * period_us:
-        yield "deadline_us", assumed("none", "nobody gave one, and it does not keep to a period")
+        yield "deadline_us", assumed("none", "not given, and the message is not periodic")
 
 
 class _Node(NamedTuple):
@@ -124,7 +124,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     yield ProfileLine("bus", "kind", machine.fact("can", 1))
     if BIT_RATE not in bus and ASK in bus:
         raise BusplanError(bus[ASK].value)
-    usual = assumed(_USUAL_OF_CARS, "no file says it, and all times follow from it")
+    usual = assumed(_USUAL_OF_CARS, "not in any file; all times depend on it")
     if nodes:
         usual = assumed(_USUAL_BIT_RATE, "no file says it; the cable decides")
     yield ProfileLine("bus", BIT_RATE, bus.get(BIT_RATE) or usual)
@@ -132,7 +132,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         note = f"no file says it{'; SYNC and PDOs are FD frames with it, too' if nodes else ''}"
         yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or assumed(DATA_BIT_RATE, note))
     if bits != _BASE_BITS:
-        yield ProfileLine("bus", "identifier_bits", machine.fact(bits, 1, note="of most messages"))
+        yield ProfileLine("bus", "identifier_bits", machine.fact(bits, 1, note="used by most messages"))
     if nodes:
         yield from lines("bus", {key: bus.get(key) for key in ("sync_identifier", "sync_counter")})
         yield ProfileLine("bus", "pipeline_cycles", assumed(1, "the host computes in the next cycle"))
@@ -230,7 +230,7 @@ def _group(name: str, nodes: list[_Node]) -> Iterator[ProfileLine]:
         facts[f"{key}_identifier"] = Fact(identifier, place, note=f"0x{identifier:x}")
     yield from lines(section, facts)
     base = assumed(20, "from SYNC to a queued feedback PDO, and from a command PDO to its effect")
-    yield from execution_lines(section, base, assumed(0.1, "what each byte adds"))
+    yield from execution_lines(section, base, assumed(0.1, "time per byte"))
 
 
 def _messages(
@@ -302,7 +302,7 @@ def _of_node(number: int, node: Facts, cycle: Sequence[Pdo], period: Fact) -> It
             "name": Fact(f"{name}-emergency", emergency.place),
             "identifier": emergency,
             "payload_bytes": Fact(_FRAME_BYTES, emergency.place, note="error code, register and data (CiA 301)"),
-            "period_us": node.get("emergency_us") or assumed(_EMERGENCY_US, "an event of a fault; one in a second"),
+            "period_us": node.get("emergency_us") or assumed(_EMERGENCY_US, "sent at a fault; one per second"),
         }
 
 
@@ -324,7 +324,7 @@ def _joined(facts: Facts, machine: Reading) -> Facts:
         del facts["period_us"]
         machine.remarks.append(
             f"{(seen | facts)['name'].value} comes every {other.value:,.0f} us by {other.place}, every "
-            f"{stated.value:,.0f} by {stated.place}: the shorter is taken"
+            f"{stated.value:,.0f} by {stated.place}: the shorter is used"
         )
     return seen | facts
 
@@ -443,7 +443,7 @@ def _settle_message(recorded: Facts, stated: Facts, log: Reading) -> None:
         del stated["period_us"]
         log.remarks.append(
             f"{stated['name'].value} comes every {recorded['period_us'].value:,.0f} us in {log.file}, every "
-            f"{period.value:,.0f} by {period.place}: the log's is taken"
+            f"{period.value:,.0f} by {period.place}: the log's is used"
         )
         return
     # The message comes as early as in the log all the same.
@@ -465,8 +465,8 @@ def give_bit_rate(machine: Reading, bit_rate_kbit_s: float) -> None:
     least = machine.bus[LEAST].value.surely if LEAST in machine.bus else 0.0
     if bit_rate_kbit_s < least:
         raise BusplanError(
-            f"bit rate {bit_rate_kbit_s:g}: frames of the log need no less than {least:.3g} kbit/s, for they do not "
-            "overlap"
+            f"bit rate {bit_rate_kbit_s:g}: frames of the log need at least {least:.3g} kbit/s, because they do "
+            "not overlap"
         )
     machine.bus[BIT_RATE] = Fact(bit_rate_kbit_s, note="as given to import")
 
@@ -477,5 +477,5 @@ def _settle_bit_rate(log: Reading, database: Reading) -> None:
         log.bus.pop(BIT_RATE, None)
         return
     del database.bus[BIT_RATE]
-    found = f"shows {shown.value:g}: the log's is taken" if shown else f"needs no less than {least:.3g}"
+    found = f"shows {shown.value:g}: the log's is used" if shown else f"needs at least {least:.3g}"
     log.remarks.append(f"{database.file} says {stated.value:g} kbit/s and {log.file} {found}")

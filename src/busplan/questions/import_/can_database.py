@@ -171,7 +171,9 @@ def _of_one_bus(database: Any, machine: Reading, bus: str | None) -> list[Any]:
     buses = sorted({str(message.bus_name or "") for message in database.messages})
     if bus is None and len(buses) > 1:
         names = ", ".join(buses)
-        raise machine.refusal(1, f"messages of {len(buses)} buses, {names}: a profile is one bus; --bus NAME reads one")
+        raise machine.refusal(
+            1, f"messages of {len(buses)} buses, {names}: a profile describes one bus; --bus NAME reads one"
+        )
     if bus is not None and bus not in buses:
         raise machine.refusal(1, f"bus {bus}: no messages of such a bus; there are {', '.join(buses) or 'none'}")
     return [message for message in database.messages if bus is None or message.bus_name == bus]

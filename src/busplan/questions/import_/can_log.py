@@ -254,7 +254,9 @@ def _facts(timing: _Timing, stretch: ClockStretch, place: str) -> Iterator[tuple
         yield "is_fd", Fact(True, place, "measured")
         yield "switches", Fact(sent.switches, place, "measured")
     yield "payload_bytes", Fact(sent.most_bytes, place, "measured", "the most seen")
-    kind = f"U {timing.uncertainty_us:.2g} us" if timing.is_periodic else "not periodic: the most in a longer time"
+    kind = (
+        f"U {timing.uncertainty_us:.2g} us" if timing.is_periodic else ("not periodic: largest rate over a longer time")
+    )
     yield "period_us", Fact(timing.period_us, place, "measured", f"{frames}, {kind}")
     yield from timing_facts(model, timing.period_us, place, is_periodic=timing.is_periodic)
     yield SENT, Fact((sent.times_us, step_us(stretch)))
@@ -265,7 +267,7 @@ def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing]) -
     number = plural(len(stretch.taken), "frame")
     yield f"The log has {number} of {plural(len(timings), 'identifier')} in {stretch.length_us / 1e6:.3g} s"
     if frames.errors:
-        yield f"{plural(frames.errors, 'error frame')}: in no load"
+        yield f"{plural(frames.errors, 'error frame')}: not counted in the load"
     if frames.remote:
         yield f"{plural(frames.remote, 'remote frame')}: taken with the data of the length code"
     seldom = [timing for timing in timings if len(timing.sent.times_us) < LEAST_EVENTS]
@@ -273,7 +275,7 @@ def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing]) -
         yield f"fewer than {LEAST_EVENTS} frames, so a longer log knows the period better: {_names(seldom)}"
     bursts = [timing for timing in timings if timing.model.burst > 1]
     if bursts:
-        yield f"in bursts, each with the most that the log has together: {_names(bursts)}"
+        yield f"in bursts, each with the largest burst in the log: {_names(bursts)}"
 
 
 def _names(timings: Iterable[_Timing]) -> str:
@@ -290,14 +292,14 @@ def _bit_rate(
     possible = [rate for rate in _BIT_RATES if rate >= least.surely]
     shown = [rate for rate in possible if _is_shown(rate, rates)]
     if shown:
-        by = "by frames of the log directly after each other"
+        by = "from back-to-back frames in the log"
         machine.bus[BIT_RATE] = machine.bus[SHOWN] = assumed(shown[0], by)
-        machine.remarks.append(f"The bit rate is {shown[0]:g} kbit/s {by}")
+        machine.remarks.append(f"The bit rate is {shown[0]:g} kbit/s, {by}")
         return
     loads = [(rate, fullest.load(rate)) for rate in possible]
     listed = [f"{100 * load:.2g} % at {rate:g}" for rate, load in loads if load <= 1]
     machine.bus[ASK] = Fact(
-        f"{machine.file}: does not show the bit rate of its bus, and all times follow from it; give --bit-rate RATE, "
+        f"{machine.file}: does not show the bit rate of its bus, on which all times depend; give --bit-rate RATE, "
         f"in kbit/s. The load of its fullest second is {', '.join(listed) or 'over 100 % at any'}"
     )
 

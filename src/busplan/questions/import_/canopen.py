@@ -171,8 +171,8 @@ def _require_apart(machine: Reading) -> None:
         for pdo in facts["feedback"].value:
             if owners.setdefault(pdo.identifier, number) != number:
                 raise BusplanError(
-                    f"{pdo.place}: {pdo.name} of node {owners[pdo.identifier]} and of node {number} would both be "
-                    f"0x{pdo.identifier:x}, without $NODEID: give the DCF of each node"
+                    f"{pdo.place}: {pdo.name} of node {owners[pdo.identifier]} and of node {number} would both "
+                    f"have identifier 0x{pdo.identifier:x}, because the file lacks $NODEID: give the DCF of each node"
                 )
 
 

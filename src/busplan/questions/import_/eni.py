@@ -274,7 +274,8 @@ def _frames(config: Element, task: _Task, machine: Reading) -> None:
         notes.append(f"{gaps} bytes are gaps in the image")
     elif gaps:
         machine.remarks.append(
-            f"{machine.file}:{task.line}: process data are {total} bytes, its devices have {needed}: those are taken"
+            f"{machine.file}:{task.line}: {total} bytes of process data, but {needed} bytes in its devices; the "
+            "latter is used"
         )
     machine.bus["process_data"] = machine.fact(layout, task.line)
     machine.bus["housekeeping_bytes"] = machine.fact([*housekeeping, *further], task.line, note=", ".join(notes))

@@ -26,7 +26,7 @@ _ALIKE: Final = (*_SIZES, "axes", "port", "every")
 _MOST_SHARE: Final = 0.999
 SLOWER: Final = "frames of slower tasks, in every cycle"
 _FROM_TASK: Final = "taken to count from the master's task on"
-_PER_BYTE: Final = "what each byte adds"
+_PER_BYTE: Final = "time per byte"
 
 
 def rows(machine: Reading) -> Iterator[ProfileLine]:
@@ -58,7 +58,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         yield ProfileLine("bus", "mailbox_polls", assumed(1, "one service request or answer in a cycle"))
         yield ProfileLine("bus", "mailbox_bytes", max(mailboxes, key=lambda mailbox: mailbox.value))
     if any("every" in facts for facts in devices):
-        yield ProfileLine("bus", "units", assumed("together", "whether slower tasks meet in a cycle no file says"))
+        yield ProfileLine("bus", "units", assumed("together", "no file says whether slower tasks meet in a cycle"))
     starter = kind_named("ethercat").starter
     master_us = next(line for line in starter.hosts[starter.host].splitlines() if line.startswith("master_us"))
     value, _, note = master_us.partition("=")[2].partition("#")
@@ -103,7 +103,7 @@ def _clocks(devices: Sequence[Facts], period: Fact) -> Facts:
     if configured:
         facts["distributed_clocks"] = configured[0]._replace(value=True)
     elif possible:
-        note = "devices have clocks; whether they act at SYNC0 no file says"
+        note = "devices have clocks; no file says whether they act at SYNC0"
         facts["distributed_clocks"] = Fact(True, possible[0].place, "assumed", note)
     if shifts:
         # The earliest SYNC0 decides. One at a task is that of the next task.
@@ -112,7 +112,7 @@ def _clocks(devices: Sequence[Facts], period: Fact) -> Facts:
         note = f"{soonest.value:g} us, {soonest.note or _FROM_TASK}"
         shift = Fact(round(share, 6), soonest.place, soonest.grade if soonest.note else "assumed", note)
         if not share and soonest.grade != "derived":
-            note = "ShiftTime is 0, but counts from the clocks' cycle; where the master's task lies no file says"
+            note = "ShiftTime is 0, but counts from the clocks' cycle; no file says where the master's task lies"
             shift = Fact(0.5, soonest.place, "assumed", note)
         facts["sync_shift"] = shift
     return facts

@@ -75,7 +75,7 @@ def recognised(content: bytes, *, name: str) -> Format:
     elif re.match(_CAPTURE, content):
         raise BusplanError(
             f"{name}: a capture, but not of SocketCAN: of EtherCAT import reads the ENI, `ethercat slaves -v` or "
-            f"slaveinfo, and `busplan measured PROFILE.toml {name}` holds the capture against the profile"
+            f"slaveinfo, and `busplan measured PROFILE.toml {name}` compares the capture with the profile"
         )
     elif not content.startswith(UTF_16) and b"\0" in content[:100_000]:
         what = "binary data, "

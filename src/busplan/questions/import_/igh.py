@@ -63,7 +63,7 @@ def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
         if header := _HEADER.match(content):
             masters.add(header[1])
             if len(masters) > 1:
-                raise machine.refusal(line, "a second master: a profile is one bus; give the text of one master")
+                raise machine.refusal(line, "a second master: a profile describes one bus; give the text of one master")
             device = devices.setdefault(int(header[2]), [])
         if device is not None:
             device.append((line, content))

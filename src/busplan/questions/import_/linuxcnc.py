@@ -24,7 +24,7 @@ def read(content: bytes, name: str) -> Reading:
     masters = list(root.all("master"))
     if len(masters) != 1:
         line = masters[1].line if masters else root.line
-        raise machine.refusal(line, f"{len(masters)} masters: a profile is one bus; give a file of one <master>")
+        raise machine.refusal(line, f"{len(masters)} masters: a profile describes one bus; give a file of one <master>")
     master = masters[0]
     period = _number(master, "appTimePeriod", machine, most=_MOST_TIME_NS)
     if period and period.value:

@@ -126,7 +126,7 @@ class ControlWords:
     def axes(self, machine: Reading, *, line: Line | None) -> Fact:
         """Axes of the device; a `line` of None means that the file does not list its PDOs."""
         if line is None:
-            return assumed(0, "which PDOs it has no file says")
+            return assumed(0, "no file says which PDOs it has")
         if not self.lines:
             return machine.fact(0, line, "derived", "no control word of CiA 402 in its PDOs")
         return machine.fact(len(self.lines), next(iter(self.lines.values())), "derived", "control words of CiA 402")
@@ -144,7 +144,8 @@ def merged(readings: Iterable[Reading]) -> Reading:
     for reading in ranked:
         if reading.kind != machine.kind:
             raise BusplanError(
-                f"{first.file} is of {machine.kind} and {reading.file} of {reading.kind}: a profile is one bus; give "
+                f"{first.file} is of {machine.kind} and {reading.file} of {reading.kind}: a profile describes one "
+                "bus; give "
                 "the files of one"
             )
         if machine.kind == "can" and (both := machine.nodes.keys() & reading.nodes.keys()):
@@ -165,7 +166,7 @@ def merged(readings: Iterable[Reading]) -> Reading:
     if machine.kind == "ethercat":
         _require_one_machine(ranked)
     for words, *more in differences.values():
-        machine.remarks.append(f"{words}; the first is taken{f', in {len(more)} more places, too' if more else ''}")
+        machine.remarks.append(f"{words}; the first is used{f', in {len(more)} more places, too' if more else ''}")
     return machine
 
 

@@ -67,7 +67,7 @@ def _blocks(plan: PlanAnswer) -> Iterator[Block]:
     yield _options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
     circle = " No circle was run: a plan is of the bus alone." if plan.profile.asks_for_circle else ""
-    yield Sentence((f"{mark}'Held by' is what keeps a row from fitting.{circle}",))
+    yield Sentence((f"{mark}'Held by' names the limit that keeps a row from fitting.{circle}",))
 
 
 def settings(meanings: Mapping[str, str], changes: NewValues) -> Sentence:
@@ -76,8 +76,8 @@ def settings(meanings: Mapping[str, str], changes: NewValues) -> Sentence:
     Examples
     --------
     >>> from busplan.forms.numbers import sentence_text
-    >>> sentence_text(settings({"bus.speed": "if all nodes can"}, {"bus.nodes": 20, "bus.speed": "S400"}))
-    'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'
+    >>> sentence_text(settings({"bus.speed": "if all nodes support it"}, {"bus.nodes": 20, "bus.speed": "S400"}))
+    'bus.nodes = 20, bus.speed = "S400" (if all nodes support it)'
     """
     # The number of nodes is the goal here, so the note on a second bus does not apply.
     return settings_sentence(changes, meanings={key: words for key, words in meanings.items() if key != "bus.nodes"})

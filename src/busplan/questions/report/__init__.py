@@ -284,7 +284,7 @@ def _reported(
         if profile.has_cycle:
             yield PageSection("map", "What fits, and what limits it", command("map"), map_(profile).report())
         latencies = latency(profile).report()
-        yield PageSection("latency", "How long data take", command("latency"), latencies)
+        yield PageSection("latency", "Delay of data", command("latency"), latencies)
         if profile.has_cycle:
             try:
                 events = timeline(profile).report()

@@ -51,7 +51,7 @@ def require_executor(executor: object, *, circle: bool) -> None:
         Not a `concurrent.futures.Executor`, or given without circle tests.
     """
     if executor is not None and not (circle and isinstance(executor, Executor)):
-        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
+        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": needs circle=True"
         raise BusplanError(f"executor{wrong}")
 
 

@@ -80,7 +80,7 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
         yield from _circles(sweep, table)
     yield from payload_sentences(sweep.profile, sweep.grid.axes)
     if sweep.group:
-        yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(sweep.group))
+        yield sentence("Axes are counted with more nodes of {}, with the other groups unchanged.", Code(sweep.group))
     safety = sweep.safety.figure
     unsafe = 0 if safety is None else np.sum(~first[safety.key].astype(bool))
     if unsafe and safety is not None:

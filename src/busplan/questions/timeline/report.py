@@ -309,7 +309,7 @@ def _totals_table(schedule: Schedule) -> Table:
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(schedule, total) for total in totals(schedule)),
-        sentence(f"What takes {part}, {{}}", ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)),
+        sentence(f"Use of {part}, {{}}", ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)),
     )
 
 
