@@ -26,7 +26,7 @@ from busplan.questions.base.sentences import (
     used_us,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
-from busplan.questions.fit.cure import NODES, Changes, Cure, SettingForPeriod, Variant, Variants, cure
+from busplan.questions.fit.cure import NODES, AtPeriod, Changes, Cure, SettingForPeriod, Variants, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
@@ -175,7 +175,7 @@ def _trials(network: Network, results: tuple[CapacityFigures, ...], variants: Va
         network, model=model
     )
     missed = missed_limits(network)
-    mending, mended = _change(Variant(network, variants), deciding, is_missed=bool(missed))
+    mending, mended = _change(AtPeriod(network, variants), deciding, is_missed=bool(missed))
     return _Trials(deciding, variants, missed, mending, mended, reset(network, deciding))
 
 
@@ -210,11 +210,11 @@ def _verdict(
     return replace(verdict, card=card, brief_card=brief_card)
 
 
-def _change(target: Variant, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, Network | None]:
+def _change(target: AtPeriod, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, Network | None]:
     """The change that mends what is wrong or makes room on a full bus for one more node, and the network after it."""
     if now.verdict == FITS and now.safe and not is_missed:
         if now.safe_nodes is None or now.safe_nodes > now.nodes:
-            return Cure(None), None  # there is room, or nobody said which of the groups is to grow
+            return Cure({}), None  # there is room, or nobody said which of the groups is to grow
         if now.safe_nodes == MAX_COUNT:
             return Cure(None, f"{MAX_COUNT} nodes are the most that a profile can have"), None
         one_more = target.after(more := {NODES: now.safe_nodes + 1})
@@ -433,7 +433,7 @@ def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Li
     elif network.groups and figures.bias_us is None:
         (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
         yield "correction", Sentence((f"none: {error}",))
-    yield "checked against", Sentence((checked_against(tested, has_cycle=False),))
+    yield "checked against", Sentence((checked_against(tested, with_untested=False),))
     for model, missing in verdict.not_applicable.items():
         yield f"{model} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
 
