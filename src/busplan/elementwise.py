@@ -235,6 +235,12 @@ def within(number: Number, most: Number) -> Number:
     return number <= bound
 
 
+def is_over(number: Number, most: Number) -> Number:
+    """Whether a number is larger than a limit, but for the rounding of floats, so not `within` it."""
+    bound: Number = most * (1 + FIT_ROUNDING)
+    return number > bound
+
+
 def larger(left: Number, right: Number) -> Number:
     """The larger of two numbers, the first of equals.
 

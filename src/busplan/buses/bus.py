@@ -193,11 +193,11 @@ class Bus(ABC):
 
     def broken(self, network: Network) -> tuple[Limit, ...]:
         """Limits that a network breaks, safety limits left out, in plain numbers."""
-        return tuple(limit for limit in self.limits if limit.role != "safety" and limit.is_broken(network))
+        return tuple(limit for limit in self.limits if limit.role != "safety" and limit.is_surely_broken(network))
 
     def is_safe(self, network: Network) -> bool:
         """Whether a network keeps every safety limit, in plain numbers."""
-        return not any(limit.is_broken(network) for limit in self.limits if limit.role == "safety")
+        return not any(limit.is_surely_broken(network) for limit in self.limits if limit.role == "safety")
 
     def event_kind(self, key: str) -> EventKind:
         """Name and colour of an event or a stretch of events."""

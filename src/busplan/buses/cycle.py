@@ -368,7 +368,7 @@ def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
     for event in run.events if run.laid_out is None else run.laid_out(number):
         if event.rounds == ALL or (event.rounds == FIRST) == (number == 0):
             has_node = node is not None and event.transaction is not None
-            yield event._replace(us=event.us, node=node if has_node else event.node)
+            yield event._replace(node=node) if has_node else event
 
 
 def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]) -> float | None:

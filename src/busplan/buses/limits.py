@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject
-from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, next_entry, smaller
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller
 from busplan.english import told_apart
 from busplan.sourced import Grade
 
@@ -130,7 +130,7 @@ class Limit(ABC):
 
     @abstractmethod
     def words(self, network: Network) -> str:
-        """By how much a network of plain numbers breaks it, or that it is not shown to be kept: a sentence."""
+        """Sentence on the excess over the bound, or on why the limit is not shown to be kept; of plain numbers."""
 
     def doubt(self, network: Network) -> Number:  # noqa: ARG002 - most are exact
         """Standard uncertainty of value - bound."""
@@ -179,21 +179,16 @@ class Limit(ABC):
         least, possible = self.value(network) - self.uncertainty(network), self.perhaps(network)
         return least if is_off(possible) else choose(possible < inf, least - smaller(possible, _MOST), -inf)
 
-    def is_broken(self, network: Network) -> Number:
-        """Whether a network surely breaks it, at the lower bound of the value: a bool, or an array of them."""
+    def is_surely_broken(self, network: Network) -> Number:
+        """Whether the lower bound of the value is over the bound: a bool, or an array of them."""
         return is_over(self.least_value(network), self.most(network))
 
     def verdict_code(self, network: Network) -> Number:
-        """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
-        surely = choose(self.is_broken(network), BROKEN, KEPT)
+        """Verdict: `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
+        surely = choose(self.is_surely_broken(network), BROKEN, KEPT)
         if self.is_exact:
             return surely
         return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
-
-
-def is_over(value: Number, most: Number) -> Number:
-    """Whether a value is over a bound, float rounding aside: a bool, or an array of them."""
-    return value > most * (1 + FIT_ROUNDING)
 
 
 class Held(NamedTuple):
@@ -218,7 +213,7 @@ class Held(NamedTuple):
         return value + self.limit.uncertainty(network) if self.is_shown else value
 
     def excess(self, network: Network) -> Number:
-        """By how much the value is over the bound: more than 0 where a network breaks it."""
+        """Excess of the value over the bound; above 0 where broken."""
         return self.value(network) - self.limit.most(network) * (1 + FIT_ROUNDING)
 
     def is_broken(self, network: Network) -> Number:
@@ -254,7 +249,7 @@ class ExactLimit(Limit):
         return self.most_of(network)
 
     def words(self, network: Network) -> str:
-        """By how much a network breaks it."""
+        """Sentence on the excess over the bound."""
         if not isinstance(self.over, str):
             return self.over(network)
         return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)

@@ -9,8 +9,8 @@ from busplan.sourced import read_toml
 
 
 @cache
-def published(name: str) -> dict[str, Any]:
-    """Published figures in the data file of that name, from the package."""
+def data_file(name: str) -> dict[str, Any]:
+    """Content of the data file of that name in the package: published figures."""
     return read_toml("busplan", f"data/{name}.toml")
 
 
@@ -22,7 +22,7 @@ def rows_of(name: str, part: str) -> list[dict[str, Any]]:
     >>> [row["published"] for row in rows_of("ethercat", "bytes")]
     [0.0839, 0.0841, 0.0826]
     """
-    return [row for table in published(name)["evidence"] if table.get("part") == part for row in table["rows"]]
+    return [row for table in data_file(name)["evidence"] if table.get("part") == part for row in table["rows"]]
 
 
 class Spread(NamedTuple):
@@ -62,14 +62,14 @@ def parts_tested(names: Sequence[str]) -> Tested:
     """Parts that data files set and test, by their tables [set_by] and [tested], and parts that they do not test."""
 
     def parts(table: str) -> dict[str, str]:
-        return {part: _words(name, part, row) for name in names for part, row in published(name).get(table, {}).items()}
+        return {part: _words(name, part, row) for name in names for part, row in data_file(name).get(table, {}).items()}
 
-    untested = (part for name in names for part in published(name).get("untested", ()))
+    untested = (part for name in names for part in data_file(name).get("untested", ()))
     return Tested(parts("set_by"), parts("tested"), tuple(untested))
 
 
 def _words(name: str, part: str, row: Mapping[str, Any]) -> str:
     """Words of a part; {count} is the length of the list `of` [table, key], or the rows of evidence of the part."""
     table, key = row.get("of", ("", ""))
-    words: str = row["words"].format(count=len(published(name)[table][key] if table else rows_of(name, part)))
+    words: str = row["words"].format(count=len(data_file(name)[table][key] if table else rows_of(name, part)))
     return words

@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.limits import Value
 from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity
+from busplan.elementwise import within
 from busplan.english import listed, printable, told_apart
 from busplan.gate.rules import (
     CIRCLE,
@@ -21,7 +22,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import LoadedProfile, Spot
 from busplan.profile.edit import short_text
 from busplan.questions.base.arguments import FilePath
-from busplan.questions.fit.certainty import available_us, fits_in
+from busplan.questions.fit.certainty import available_us
 from busplan.questions.fit.circle_setup import path_steps, refusals
 from busplan.questions.fit.cure import changeable, cure
 from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
@@ -108,7 +109,7 @@ class Subject:
         """Other timing models, each with whether the cycle fits, found without all their figures."""
         given_us, bus = available_us(self.network), self.network.bus
         return tuple(
-            (model, bool(fits_in(bus.cycle(self.network, model=model).required_us, available_us=given_us)))
+            (model, bool(within(bus.cycle(self.network, model=model).required_us, given_us)))
             for model in model_names(self.network)
             if model != bus.deciding_model
         )

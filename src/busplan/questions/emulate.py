@@ -17,7 +17,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Code, Report, Sentence
 from busplan.progress import ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.arguments import ProfileLike, finite, load_network, whole, with_its_constants
+from busplan.questions.base.arguments import ProfileLike, finite, load_network, whole_number, with_its_constants
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
@@ -121,11 +121,11 @@ def emulate(
         raise BusplanError("cycles and duration_us: give one of them")
     if duration_us is not None:
         cycles = ceil(finite(duration_us, name="duration_us") / period_us)
-    number = whole(_CYCLES if cycles is None else cycles, name="cycles")
+    number = whole_number(_CYCLES if cycles is None else cycles, name="cycles")
     if not isinstance(fault, Mapping | None):
         raise BusplanError(f'fault {fault!r}: expected values by name, as {{"jitter": 50}}')
     values = {name: _value(fault_named(emulator, name), value, period_us) for name, value in (fault or {}).items()}
-    random = Random(whole(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
+    random = Random(whole_number(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
     content = emulator.emulated(network, Emulation(number, random, values, origin))
     inside, unsure = _not_found(network, emulator, content, values)
@@ -181,7 +181,7 @@ def _value(fault: Fault, value: object, period_us: float) -> float:
     """Value of a fault: its number in the recording, or its delay [us]."""
     name = f"fault {fault.name}"
     if fault.unit == "1":
-        return whole(int(fault.default) if value is None else value, name=name)
+        return whole_number(int(fault.default) if value is None else value, name=name)
     late_us = fault.default * period_us if value is None else finite(value, name=name)
     if late_us <= 0:
         raise BusplanError(f"{name}: {late_us:g}; expected a time above zero")

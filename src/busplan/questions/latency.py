@@ -1,7 +1,8 @@
 """`busplan.latency`."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from operator import itemgetter
 from typing import Final, NamedTuple
@@ -31,7 +32,7 @@ from busplan.questions.base.arguments import (
     checked_models,
     load_network,
     one_or_several,
-    whole,
+    whole_number,
     with_its_constants,
 )
 from busplan.questions.base.sentences import (
@@ -156,7 +157,7 @@ def latency(
     networks = [network]
     if payload_bytes is not None:
         given = one_or_several(payload_bytes, name="payload_bytes")
-        sizes = [whole(size, name="payload_bytes") for size in given]
+        sizes = [whole_number(size, name="payload_bytes") for size in given]
         _require_execution(network.profile, sizes)
         networks = [with_payloads(network, [(size, size)] * len(network.profile.node_groups)) for size in sizes]
     tables = tuple(_transactions(variant, models) for variant in networks)
@@ -189,14 +190,14 @@ def _transactions(network: Network, models: Sequence[str]) -> tuple[Transaction,
     nodes = int(network.nodes)
     by_model = (network.bus.cycle(network, model=model).latencies() for model in models)
     return tuple(
-        Transaction(model, phased.name, phased.group, phased.payload_bytes, nodes, _whole_bytes(phased.phases))
+        Transaction(model, phased.name, phased.group, phased.payload_bytes, nodes, _shown_phases(phased.phases))
         for of_models in zip(*by_model, strict=True)
         for model, phased in zip(models, of_models, strict=True)
     )
 
 
-def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
-    """Phases with the sizes of packets as whole numbers; None for one that does not exist."""
+def _shown_phases(phases: Mapping[str, Number]) -> dict[str, float | None]:
+    """Phases in plain numbers, the sizes of packets whole; None for one that does not exist."""
     numbers = {key: existing(value) for key, value in phases.items()}
     return {
         key: int(value) if value is not None and key.endswith("_bytes") else value for key, value in numbers.items()
@@ -313,11 +314,13 @@ def _tables(answer: LatencyAnswer) -> Iterator[Block]:
             caption=caption,
             unit=False,
             hides_equations=True,
-            is_detail=lambda figure, shown=shown, table=table: (
-                figure.key not in shown  # type: ignore[misc]
-                or not any(transaction.phases[figure.key] for transaction in table)
-            ),
+            is_detail=partial(_is_detail, shown, table),
         )
+
+
+def _is_detail(shown: Collection[str], table: Sequence[Transaction], figure: Figure) -> bool:
+    """Whether a figure is not among those shown by default, or no transaction of the table has it."""
+    return figure.key not in shown or not any(transaction.phases[figure.key] for transaction in table)
 
 
 def _is_beside(transaction: Transaction, table: Sequence[Transaction], deciding: str) -> bool:

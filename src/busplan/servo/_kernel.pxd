@@ -5,7 +5,7 @@ from libc.stdint cimport int64_t
 
 cdef int64_t CONTROL, SWITCH, STORE
 cdef double ROUND
-cdef Py_ssize_t INTEGRAL, LAST_ERROR, QUEUE
+cdef Py_ssize_t POSITION, VELOCITY, DISTURBANCE, SIGN, COMMAND, INTEGRAL, LAST_ERROR, QUEUE
 
 
 @cython.locals(

@@ -19,6 +19,11 @@ STORE = 4
 ROUND = 6755399441055744.0
 """1.5 * 2^52."""
 
+POSITION = 0
+VELOCITY = 1
+DISTURBANCE = 2
+SIGN = 3
+COMMAND = 4
 INTEGRAL = 5
 LAST_ERROR = 6
 QUEUE = 7
@@ -68,7 +73,8 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
         Number of positions stored.
     """
     kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
-    position, velocity, disturbance, sign, command = state[0], state[1], state[2], state[3], state[4]
+    position, velocity, disturbance = state[POSITION], state[VELOCITY], state[DISTURBANCE]
+    sign, command = state[SIGN], state[COMMAND]
     # Every chunk begins with a control, so no command is pending between chunks.
     pending = command
     remembers = ki > 0.0 or kd > 0.0
@@ -129,11 +135,11 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
             if store:
                 out[stored] = position
                 stored += 1
-    state[0] = position
-    state[1] = velocity
-    state[2] = disturbance
-    state[3] = sign
-    state[4] = command
+    state[POSITION] = position
+    state[VELOCITY] = velocity
+    state[DISTURBANCE] = disturbance
+    state[SIGN] = sign
+    state[COMMAND] = command
     return stored
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import busplan
 from busplan.buses import kind_names
-from busplan.buses.published import published
+from busplan.buses.published import data_file
 from busplan.errors import BusplanError
 from busplan.forms import render
 from busplan.questions import evidence as rows
@@ -19,8 +19,8 @@ Breaks = Callable[[dict[str, Any]], object]
 @pytest.fixture
 def table(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """The table of SERCOS II, which a test may change."""
-    data = deepcopy(published("sercos2"))
-    monkeypatch.setattr(rows, "published", lambda _: data)
+    data = deepcopy(data_file("sercos2"))
+    monkeypatch.setattr(rows, "data_file", lambda _: data)
     (only,) = data["evidence"]
     return only  # type: ignore[no-any-return]
 
@@ -72,9 +72,9 @@ def test_a_row_that_is_wrong_is_named_with_its_file(table: dict[str, Any], break
 
 
 def test_a_function_refuses_arguments_that_it_does_not_take(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = deepcopy(published("can"))
+    data = deepcopy(data_file("can"))
     data["evidence"][0]["rows"][0]["given"]["bits"] = 1
-    monkeypatch.setattr(rows, "published", lambda _: data)
+    monkeypatch.setattr(rows, "data_file", lambda _: data)
     with pytest.raises(BusplanError, match=r"can\.toml: .*row '0 bytes.*frame_bits\(\) got an unexpected keyword"):
         busplan.evidence("can")
 

@@ -1,5 +1,6 @@
-"""A CAN network of messages alone, and what it shares with one that has a cycle: loads and response times."""
+"""What every CAN network has, its loads and response times; and a network of messages alone."""
 
+from abc import abstractmethod
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -18,8 +19,8 @@ from busplan.english import first_of, plural
 from busplan.sections.base import MAX_TIME_US
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
-WORST: Final[TimingModelName] = "worst-stuffing"
-NONE: Final[TimingModelName] = "no-stuffing"
+WORST_STUFFING: Final[TimingModelName] = "worst-stuffing"
+NO_STUFFING: Final[TimingModelName] = "no-stuffing"
 
 PREMISES: Final = (
     Premise("bus.error_period_us", "no repeated frames", 10_000.0),
@@ -41,10 +42,9 @@ _OF_CYCLE: Final = OF_SYNC | {"bus.host_us", "bus.pipeline_cycles"}
 
 
 class CanCycle(BusCycle):
-    """A network of messages alone: it has loads and response times, and a cycle in which no term takes time."""
+    """What every CAN network has, with and without a cycle: loads, and response times of messages."""
 
     term_figures = TERMS
-    premises = tuple(premise for premise in PREMISES if premise.key not in _OF_CYCLE)
 
     def __init__(
         self, network: Network, model: str, number: int | None = None, *, traffic: Traffic | None = None
@@ -53,16 +53,12 @@ class CanCycle(BusCycle):
         self.model = model
         self.number = number
         traffic = traffic or traffic_of(network)
-        self.traffic = traffic if model == WORST else replace(traffic, is_stuffed=False)
+        self.traffic = traffic if model == WORST_STUFFING else replace(traffic, is_stuffed=False)
         """Traffic, by default the network's; its frames are as long as in the timing model."""
 
     def of(self, traffic: Traffic) -> Self:
         """The cycle of other traffic of the same sort."""
         return type(self)(self.network, self.model, self.number, traffic=traffic)
-
-    def written(self) -> Iterator[BusEvent | Run]:
-        """No events: there is no cycle."""
-        return iter(())
 
     @cached_property
     def messages(self) -> tuple[tuple[Message, Number], ...]:
@@ -75,7 +71,7 @@ class CanCycle(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate, and the load of the bus, also with as many stuff bits as measured frames have."""
-        least, most = (type(self)(self.network, model).load for model in (NONE, WORST))
+        least, most = (type(self)(self.network, model).load for model in (NO_STUFFING, WORST_STUFFING))
         return {
             "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s,
             "bus_load": self.load,
@@ -83,9 +79,9 @@ class CanCycle(BusCycle):
         }
 
     @property
+    @abstractmethod
     def load(self) -> Number:
         """Share of the bus that everything takes, 0..1 [1]."""
-        return self.messages_load
 
     @property
     def fullest_load(self) -> Number:
@@ -98,10 +94,9 @@ class CanCycle(BusCycle):
         return total(message.of_all(us) / message.period_us for message, us in self.messages)
 
     @property
+    @abstractmethod
     def load_period_us(self) -> Number:
         """The shortest period that keeps `limits.max_load`; infinite where the messages alone take more [us]."""
-        left = self.network.profile.most_load - self.messages_load
-        return choose(left >= 0, 0.0, inf)
 
     def _queues(self) -> str:
         """Orders of queues that the profile gives, and the senders, so that a misspelt one is seen; else empty."""
@@ -173,7 +168,7 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of each frame that ends a part of the cycle, and of each message."""
-        if self.model == WORST and self.traffic.longest is not self.traffic:
+        if self.model == WORST_STUFFING and self.traffic.longest is not self.traffic:
             return self.of(self.traffic.longest).latencies()
         names = (*self.ends, *((message.name, "") for message in self.traffic.messages))
         return tuple(
@@ -183,8 +178,28 @@ class CanCycle(BusCycle):
 
     @property
     def ends(self) -> tuple[tuple[str, str], ...]:
-        """Name and group of each frame that ends a part of the cycle, in the order of `waiting.responses`."""
+        """Name and group of each frame that ends a part of the cycle, in the order of `waiting.worst_cases`."""
         return ()
+
+
+class MessagesAlone(CanCycle):
+    """A network of messages alone, with a cycle in which no term takes time."""
+
+    premises = tuple(premise for premise in PREMISES if premise.key not in _OF_CYCLE)
+
+    def written(self) -> Iterator[BusEvent | Run]:
+        """No events: there is no cycle."""
+        return iter(())
+
+    @property
+    def load(self) -> Number:
+        """Share of the bus that the messages take, 0..1 [1]."""
+        return self.messages_load
+
+    @property
+    def load_period_us(self) -> Number:
+        """The shortest period that keeps `limits.max_load`; infinite where the messages take more [us]."""
+        return choose(self.network.profile.most_load - self.messages_load >= 0, 0.0, inf)
 
 
 def _short(number: float) -> str:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.buses.can.alone import NONE, WORST, CanCycle, TimingModelName
+from busplan.buses.can.alone import NO_STUFFING, WORST_STUFFING, CanCycle, MessagesAlone, TimingModelName
 from busplan.buses.can.equations import BUS_LOAD
 from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.sync import SyncCycle
@@ -11,7 +11,16 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Network
 
-__all__ = ["EVENTS", "NONE", "STRETCHES", "WORST", "CanCycle", "SyncCycle", "TimingModelName", "can_cycle"]
+__all__ = [
+    "EVENTS",
+    "NO_STUFFING",
+    "STRETCHES",
+    "WORST_STUFFING",
+    "CanCycle",
+    "SyncCycle",
+    "TimingModelName",
+    "can_cycle",
+]
 
 _DAVIS: Final = BUS_LOAD.reference
 EVENTS: Final = (
@@ -37,5 +46,5 @@ STRETCHES: Final = (
 def can_cycle(network: Network, model: str, *, traffic: Traffic | None = None) -> CanCycle:
     """The cycle of a network under a timing model; its traffic is by default that of the network."""
     sent = traffic or traffic_of(network)
-    sort = CanCycle if not sent.has_cycle else SyncCycle if sent.has_sync else RequestCycle
+    sort = MessagesAlone if not sent.has_cycle else SyncCycle if sent.has_sync else RequestCycle
     return sort(network, model, traffic=sent)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle, can_cycle
+from busplan.buses.can.cycle import EVENTS, NO_STUFFING, STRETCHES, WORST_STUFFING, CanCycle, can_cycle
 from busplan.buses.can.equations import (
     BASE_BITS,
     BIT_RATES,
@@ -75,11 +75,11 @@ class Can(Bus):
     also_called = ("CANopen", "CAN 2.0")
     timing_models = (
         TimingModel(
-            WORST,
+            WORST_STUFFING,
             "as many stuff bits as a frame of its length can have",
             error="this timing model gives 8 to 15% more than measured classical frames",
         ),
-        TimingModel(NONE, "no stuff bits"),
+        TimingModel(NO_STUFFING, "no stuff bits"),
     )
     figures = FIGURES
     limits = LIMITS

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from busplan.buses.can.equations import bit_us
 from busplan.buses.can.streams import Points, Stream, repeated, repeated_by_place, streams
 from busplan.buses.can.traffic import NO_DEADLINE_US, SYNC, Traffic, kept
-from busplan.buses.can.waiting import Start, arriving, beside_sync, offered, responses, starts
+from busplan.buses.can.waiting import BusyStart, arriving, beside_sync, busy_starts, offered, worst_cases
 from busplan.elementwise import Number, Traced, choose, is_off, named, total, value_of
 from busplan.english import first_of
 
@@ -20,7 +20,7 @@ def phases(traffic: Traffic, place: int, name: str) -> dict[str, Number]:
 
     def figure(key: str, words: str, *behind: Number) -> Number:
         def of(traffic: Traffic, *_: Number) -> float:
-            stream, worst = responses(traffic)[place]
+            stream, worst = worst_cases(traffic)[place]
             if key in Stream._fields or key == "last":
                 number: float = getattr(stream, key)
             else:
@@ -123,14 +123,14 @@ def numbered(parts_us: Mapping[str, Number], source: str = "", **figures: Number
 @kept
 def _last_in_queue(traffic: Traffic, place: int) -> Stream | None:
     """Stream of the lowest priority in the queue of a response; None where the queue is by priority."""
-    answered, _ = responses(traffic)[place]
+    answered, _ = worst_cases(traffic)[place]
     return next((stream for stream in streams(traffic) if stream.last_place == answered.queue_place), None)
 
 
 @kept
 def _counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """Frames in a response, in words: the one that blocks, and those that go before, by number."""
-    answered, worst = responses(traffic)[place]
+    answered, worst = worst_cases(traffic)[place]
     higher, blocking, sent = [], "", offered(traffic)
     if answered.name == SYNC:
         sent = beside_sync(sent)
@@ -145,7 +145,7 @@ def _counted(traffic: Traffic, place: int) -> tuple[str, str]:
         higher.append(repeated(higher, traffic)._replace(jitter_us=errors[0].jitter_us))
     waited_us = worst.blocking_us + worst.interference_us + worst.instance * answered.frame_us
     window_us = waited_us + bit_us(traffic.bit_rate_kbit_s)
-    for start in starts(sent, traffic) if answered.is_message else [Start()]:
+    for start in busy_starts(sent, traffic) if answered.is_message else [BusyStart()]:
         numbers = [
             (stream.identifiers - (stream == answered))
             * (

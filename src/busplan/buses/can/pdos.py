@@ -13,7 +13,7 @@ from busplan.buses.can.equations import TERMS, bit_us, payload_us
 from busplan.buses.can.latency import numbered
 from busplan.buses.can.streams import frame_sizes, last_identifier, place, repeated, streams
 from busplan.buses.can.traffic import LOOP, NAMES, REPEATED, Message, Pdos, Traffic
-from busplan.buses.can.waiting import before_the_last, sent_in, waits
+from busplan.buses.can.waiting import before_the_last, longest_cycle, sent_in
 from busplan.buses.cycle import BusEvent, BusLatency, Doubt, Run, summed
 from busplan.buses.limits import COVERAGE
 from busplan.buses.network import Group, Rate
@@ -143,7 +143,7 @@ class PdoCycle(CanCycle):
         for number, (pdos, us) in enumerate(pair for pair in self._pdos if pair[0].kind == kind):
             if self._due is None or pdos.group in self._due:
                 event = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
-                yield Run((event,), pdos.pdos, number, partial(self._of_pdo, event, pdos))
+                yield Run((event,), pdos.number, number, partial(self._of_pdo, event, pdos))
 
     def _of_pdo(self, event: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
         return (event._replace(us=self.traffic.frame_us(size, self.traffic)) for size in frame_sizes(pdos))
@@ -206,10 +206,10 @@ class PdoCycle(CanCycle):
         return self._blocking_us(lasts_us, others_us, counts), counts
 
     def _waited(self, key: str, others_us: Number, words: str) -> Number:
-        """A figure of the waits for other messages, by its name in `Waits`."""
+        """A figure of the cycle with other messages, by its name in `LongestCycle`."""
 
         def of(traffic: Traffic, others_us: Number) -> Number:
-            number: Number = getattr(waits(traffic, others_us, self._due), key)
+            number: Number = getattr(longest_cycle(traffic, others_us, self._due), key)
             return number
 
         return self.traffic.ask(of, others_us, words=words)
@@ -305,7 +305,7 @@ class PdoCycle(CanCycle):
         """SYNC and PDOs of the mean cycle [us]."""
         if not self.traffic.has_rates:
             return self._in_cycle_us
-        return self.sync_us + total(pdos.pdos * us / pdos.every for pdos, us in self._pdos)
+        return self.sync_us + total(pdos.number * us / pdos.every for pdos, us in self._pdos)
 
     @property
     def load_period_us(self) -> Number:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from busplan.buses.can.cycle import WORST, can_cycle
+from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
 from busplan.buses.can.streams import Stream, streams
@@ -65,7 +65,7 @@ class _Log:
 
     def __init__(self, network: Network, frames: CanFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
-        self.cycle = can_cycle(network, WORST)
+        self.cycle = can_cycle(network, WORST_STUFFING)
         self.traffic = self.cycle.traffic
         self.bit_us = bit_us(self.traffic.bit_rate_kbit_s)
         self.edits: dict[str, Any] = {}

@@ -7,7 +7,7 @@ from itertools import chain, combinations, product
 from math import inf
 from typing import Final
 
-from busplan.buses.can.cycle import WORST, CanCycle, can_cycle
+from busplan.buses.can.cycle import WORST_STUFFING, CanCycle, can_cycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
 from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
 from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, traffic_of
@@ -167,7 +167,7 @@ def _payload_words(network: Network) -> str:
 
 def _longest(network: Network) -> CanCycle:
     """The cycle with FD frames and bits as long as they may be."""
-    return can_cycle(network, WORST, traffic=traffic_of(network).longest)
+    return can_cycle(network, WORST_STUFFING, traffic=traffic_of(network).longest)
 
 
 def _when_full(load: float) -> str:
@@ -177,7 +177,7 @@ def _when_full(load: float) -> str:
 
 def _pdos(network: Network) -> Number:
     """PDOs of all nodes in one direction [1]."""
-    return total(pdos.pdos for pdos in traffic_of(network).pdos if pdos.kind == "read")
+    return total(pdos.number for pdos in traffic_of(network).pdos if pdos.kind == "read")
 
 
 _LOAD: Final = "the bus load with the longest bits"
@@ -201,7 +201,7 @@ class Load(Limit):
 
     def perhaps(self, network: Network) -> Number:
         """Load of the bits that FD frames may take in addition [1]."""
-        return self.value(network) - can_cycle(network, WORST).load
+        return self.value(network) - can_cycle(network, WORST_STUFFING).load
 
     def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:  # noqa: ARG002 - the longest bits count
         """The period at which the load is the largest allowed [us]."""

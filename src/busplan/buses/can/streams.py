@@ -188,7 +188,7 @@ def _cyclic(traffic: Traffic) -> Iterator[Stream]:
     for pdos in traffic.pdos:
         if (identifier := int(pdos.identifier)) != FOLLOWS:
             blocks[pdos.kind] = free[pdos.kind] = identifier
-        first, count, left_bytes = free[pdos.kind], _whole(pdos.pdos), _whole(pdos.payload_bytes)
+        first, count, left_bytes = free[pdos.kind], _whole(pdos.number), _whole(pdos.payload_bytes)
         free[pdos.kind] = first + count
         for number, most_bytes in enumerate(islice(_most_bytes(pdos), most_frames)):
             is_there, size = left_bytes > 0, larger(smaller(left_bytes, most_bytes), 0)

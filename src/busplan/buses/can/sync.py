@@ -7,7 +7,7 @@ from math import inf
 from busplan.buses.can.alone import PREMISES
 from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.traffic import SYNC, Traffic
-from busplan.buses.can.waiting import sync_response, waits
+from busplan.buses.can.waiting import longest_cycle, sync_response
 from busplan.buses.cycle import BusEvent, Run
 from busplan.buses.network import Group
 from busplan.elementwise import Number, choose, larger
@@ -67,7 +67,7 @@ class SyncCycle(PdoCycle):
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
-        waited = waits(self.traffic, self._on_bus_us, self._due)
+        waited = longest_cycle(self.traffic, self._on_bus_us, self._due)
         for message in waited.blocks()[first:end]:
             yield blocking._replace(us=message.frame_us, label=f"message {message.name} of a lower priority")
 

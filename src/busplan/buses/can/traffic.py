@@ -38,7 +38,7 @@ class Pdos(NamedTuple):
     """Name of the group; empty where all nodes are alike."""
     identifier: Number
     """Identifier of the first frame of the first PDO; `FOLLOWS` continues the group before."""
-    pdos: Number
+    number: Number
     """PDOs of all nodes of the group [1]."""
     payload_bytes: Number
     """Data of each PDO [bytes]."""
@@ -85,22 +85,6 @@ class Message(NamedTuple):
 
 _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result")
-
-
-def of_last(function: "Callable[[Network], Traffic]") -> "Callable[[Network], Traffic]":
-    """Decorator of a function of a network that remembers the last one: each limit of a network asks again.
-
-    A network may hold arrays, so it is no key of a table and is told apart by identity.
-    """
-    last: list[tuple[Network, Traffic]] = []
-
-    @wraps(function)
-    def of_network(network: Network) -> "Traffic":
-        if not last or last[0][0] is not network:
-            last[:] = [(network, function(network))]
-        return last[0][1]
-
-    return of_network
 
 
 def kept(
@@ -183,7 +167,7 @@ class Traffic:
     @property
     def requests(self) -> Number:
         """Requests of a cycle without SYNC, each with an answer [1]."""
-        return total(pdos.pdos for pdos in self.pdos if pdos.kind == "write")
+        return total(pdos.number for pdos in self.pdos if pdos.kind == "write")
 
     @property
     def has_rates(self) -> bool:
@@ -285,13 +269,26 @@ class Traffic:
 
 _OF_CYCLE: Final = tuple(field.name for field in fields(Traffic) if field.type is Number)
 """Fields of traffic that are a number."""
-_OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
+_OF_PDOS: Final = ("identifier", "number", "payload_bytes", "every")
 """Fields of PDOs that are a number."""
 
 
-@of_last
+_LAST: Final[list[tuple[Network, Traffic]]] = []
+"""The last network and its traffic."""
+
+
 def traffic_of(network: Network) -> Traffic:
-    """Traffic of a network, with the stuff bits of the worst case."""
+    """Traffic of a network, with the stuff bits of the worst case.
+
+    The last one is remembered, for each limit of a network asks again. A network may hold arrays, so it is no key of a
+    table and is told apart by identity.
+    """
+    if not _LAST or _LAST[0][0] is not network:
+        _LAST[:] = [(network, _traffic_of(network))]
+    return _LAST[0][1]
+
+
+def _traffic_of(network: Network) -> Traffic:
     bus, groups = network.profile.bus, network.groups
     alone = Traffic(
         bit_rate_kbit_s=bus.bit_rate_kbit_s,

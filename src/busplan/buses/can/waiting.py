@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
 
-class Waits(NamedTuple):
-    """Waits of a cycle, from the queued SYNC to the end of the last command."""
+class LongestCycle(NamedTuple):
+    """The longest cycle, from the queued SYNC to the end of the last command, and what it waits for."""
 
     lasts_us: Points
     """Time from the queued SYNC to the end of the last command, w [us]."""
@@ -47,7 +47,7 @@ def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
     return [stream for stream in cyclic if stream.name == SYNC or stream.group in due]
 
 
-def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> Waits:
+def longest_cycle(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> LongestCycle:
     """Time of a cycle that takes `others_us` without the frames of other messages, with them [us].
 
     `due` names the groups whose PDOs are in the cycle; without it the cycle is the fullest, and no other lasts longer.
@@ -71,10 +71,12 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
-    return _waits(offered(traffic), traffic, others_us, due)
+    return _longest_cycle(offered(traffic), traffic, others_us, due)
 
 
-def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> Waits:
+def _longest_cycle(
+    sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
+) -> LongestCycle:
     cyclic = [stream for stream in sent if not stream.is_message]
     bit, fullest = bit_us(traffic.bit_rate_kbit_s), last_place(cyclic)
     messages = [stream for stream in arriving(sent, fullest) if stream.is_message]
@@ -98,13 +100,13 @@ def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: fro
         # A frame that blocks may be repeated, too, where the bus is idle behind it.
         messages.append(repeated(sent, traffic))
     if not messages:
-        return Waits(others_us, 0.0, (), most)
+        return LongestCycle(others_us, 0.0, (), most)
     before = [(message, message.first_place <= last) for message in messages]
     lower = [(message, message.last_place > last) for message in messages]
     if not traffic.has_sync:
-        return Waits(_of_requests_us(before, lower, traffic, others_us), 0.0, (), 0)
+        return LongestCycle(_of_requests_us(before, lower, traffic, others_us), 0.0, (), 0)
     once_us = total(choose(goes, message.burst_us, 0.0) for message, goes in before)
-    lasts_us, blocking_us = _cycle_waits(
+    lasts_us, blocking_us = _beside_messages(
         most,
         others_us + once_us,
         bit,
@@ -112,7 +114,7 @@ def _waits(sent: Sequence[Stream], traffic: Traffic, others_us: Points, due: fro
         before_us=[choose(goes, message.frames_us, 0.0) for message, goes in before],
         lower_us=[choose(blocks, message.frame_us, 0.0) for message, blocks in lower],
     )
-    return Waits(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
+    return LongestCycle(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
 
 
 def _of_requests_us(
@@ -132,7 +134,7 @@ def _of_requests_us(
         (late, [True] * len(late), 0.0),
     ):
         once_us = total(choose(is_sent, message.burst_us, 0.0) for message, is_sent in zip(sent, goes, strict=True))
-        bound_us, _ = _cycle_waits(
+        bound_us, _ = _beside_messages(
             int(c.MOST_BLOCKS),
             others_us + blocked_us + once_us,
             bit_us(traffic.bit_rate_kbit_s),
@@ -144,7 +146,7 @@ def _of_requests_us(
     return smaller(*bounds_us)
 
 
-def _cycle_waits(
+def _beside_messages(
     most: int,
     others_us: Points,
     bit: Points,
@@ -171,7 +173,7 @@ def before_the_last(traffic: Traffic, due: frozenset[str] | None, name: str) -> 
     return message.first_place <= last_place(cyclic if due is None else sent_in(cyclic, due)), message.jitter_us
 
 
-class Response(NamedTuple):
+class WorstCase(NamedTuple):
     """Worst case of a message: R = J + B + I + q C - (q - b + 1) T + C."""
 
     blocking_us: Points
@@ -185,7 +187,7 @@ class Response(NamedTuple):
 
 
 @kept
-def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tuple[Stream, Response], ...]:
+def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tuple[Stream, WorstCase], ...]:
     """Every message in the order of the profile, with its worst-case response.
 
     For a verdict a bound, without parts, is enough where it shows that a deadline is kept.
@@ -193,7 +195,7 @@ def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tu
     sent = offered(traffic)
     messages = [number for number, stream in enumerate(sent) if stream.is_message]
     enough_us = [stream.deadline_us for stream in sent] if is_verdict else None
-    worst = _worst(sent, messages, starts(sent, traffic), traffic, enough_us=enough_us)
+    worst = _worst(sent, messages, busy_starts(sent, traffic), traffic, enough_us=enough_us)
     return tuple((sent[number], response) for number, response in worst.items())
 
 
@@ -211,7 +213,7 @@ def offered(traffic: Traffic) -> tuple[Stream, ...]:
     sent = streams(traffic)
     queued = [number for number, stream in enumerate(sent) if stream.is_message and stream.queue_place is not None]
     for _ in range(_ROUNDS if queued else 0):
-        before, worst = sent, _worst(sent, queued, starts(sent, traffic), traffic)
+        before, worst = sent, _worst(sent, queued, busy_starts(sent, traffic), traffic)
         sent = tuple(
             stream._replace(offered_us=smaller(worst[number].us - stream.frame_us, _NEVER_US))
             if number in worst
@@ -248,13 +250,13 @@ def arriving(sent: Sequence[Stream], end: Points) -> list[Stream]:
     ]
 
 
-def sync_response(traffic: Traffic) -> Response:
+def sync_response(traffic: Traffic) -> WorstCase:
     """Worst-case response of SYNC.
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
     sent = beside_sync(offered(traffic))
-    return _worst(sent, [0], [Start()], traffic, blocks=[stream.is_message for stream in sent])[0]
+    return _worst(sent, [0], [BusyStart()], traffic, blocks=[stream.is_message for stream in sent])[0]
 
 
 def beside_sync(sent: tuple[Stream, ...]) -> tuple[Stream, ...]:
@@ -265,7 +267,7 @@ def beside_sync(sent: tuple[Stream, ...]) -> tuple[Stream, ...]:
 
 
 @kept
-def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
+def worst_cases(traffic: Traffic) -> tuple[tuple[Stream, WorstCase], ...]:
     """SYNC, the last stream of each PDO, and every message, with the worst-case response of its last frame.
 
     Without SYNC a PDO may wait for each other one, as if all were queued at once: messages gather behind those before.
@@ -281,11 +283,13 @@ def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     }
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
-    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [Start()], traffic).items()]
+    pdos = [
+        (sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [BusyStart()], traffic).items()
+    ]
     return (*sync, *pdos, *message_responses(traffic))
 
 
-class Start(NamedTuple):
+class BusyStart(NamedTuple):
     """Instant at which a busy period begins: late PDOs come at once, and all of the cycle in the next one."""
 
     late: Container[str] = ()
@@ -305,7 +309,7 @@ class Start(NamedTuple):
         return smaller(self.late_us + stream.jitter_us - again_us, 0.0)
 
 
-def starts(sent: Sequence[Stream], traffic: Traffic) -> list[Start]:
+def busy_starts(sent: Sequence[Stream], traffic: Traffic) -> list[BusyStart]:
     """Instants at which a busy period of a message may begin: it has the worst of these.
 
     SYNC comes once a period, sooner by its jitter, and feedback and commands behind it. So a busy period that begins
@@ -315,33 +319,33 @@ def starts(sent: Sequence[Stream], traffic: Traffic) -> list[Start]:
     before it then is sent in this cycle.
     """
     if not traffic.has_cycle:
-        return [Start()]
+        return [BusyStart()]
     us = dict.fromkeys((SYNC, _FEEDBACK, _COMMAND), 0.0)
     for stream in sent:
         if not stream.is_message:
             us[stream.name] = us[stream.name] + stream.frames_us
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
-    lasts_us = _waits(sent, traffic, others_us).lasts_us
+    lasts_us = _longest_cycle(sent, traffic, others_us).lasts_us
     if not traffic.has_sync or any(stream.queue_place is not None and not stream.is_message for stream in sent):
-        return [Start(), Start((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
+        return [BusyStart(), BusyStart((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
     commands_us = lasts_us - us[_COMMAND]
     feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
     return [
-        Start(),
-        Start((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us),
-        Start((_COMMAND,), commands_us, traffic.period_us),
+        BusyStart(),
+        BusyStart((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us),
+        BusyStart((_COMMAND,), commands_us, traffic.period_us),
     ]
 
 
 def _worst(
     sent: Sequence[Stream],
     answered: Collection[int],
-    begun: Sequence[Start],
+    begun: Sequence[BusyStart],
     traffic: Traffic,
     *,
     blocks: Sequence[bool] | None = None,
     enough_us: Sequence[Points] | None = None,
-) -> dict[int, Response]:
+) -> dict[int, WorstCase]:
     """Worst-case response of the last frame of some streams, the longest of each stream, by their numbers in `sent`.
 
     All identifiers from `block` on go before a stream. Each other stream may hold it up, unless `blocks` says no. Where
@@ -353,7 +357,7 @@ def _worst(
         # Those before the same ends of queues meet all others alike.
         is_plain = all(isinstance(is_it, bool) for is_it in later)
         levels.setdefault(sum(later) if is_plain else f"message {number}", []).append(number)
-    worst: dict[int, Response] = {}
+    worst: dict[int, WorstCase] = {}
     for numbers in levels.values():
         seen = arriving(sent, sent[numbers[0]].end_place)
         worst |= _searched(seen, numbers, begun, traffic, blocks=blocks, enough_us=enough_us)
@@ -363,12 +367,12 @@ def _worst(
 def _searched(
     sent: Sequence[Stream],
     answered: Sequence[int],
-    begun: Sequence[Start],
+    begun: Sequence[BusyStart],
     traffic: Traffic,
     *,
     blocks: Sequence[bool] | None,
     enough_us: Sequence[Points] | None,
-) -> Iterator[tuple[int, Response]]:
+) -> Iterator[tuple[int, WorstCase]]:
     """Responses of streams that meet the others alike, as `response.responses` finds them."""
     both = [*sent, *repeated_by_place(sent, traffic)]
     order = sorted(range(len(both)), key=lambda number: both[number].block)
@@ -411,7 +415,7 @@ def _searched(
         blocked_us, late, wait_us, us = (_points(table[:, place], shape) for table in found)
         instance = (late if shape else int(late)) + sent[number].burst - 1
         interference_us = wait_us - blocked_us - instance * sent[number].frame_us
-        yield number, Response(blocked_us, instance, interference_us, us)
+        yield number, WorstCase(blocked_us, instance, interference_us, us)
 
 
 def _token(number: Points) -> float:

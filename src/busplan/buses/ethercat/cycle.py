@@ -201,17 +201,22 @@ class EthercatCycle(BusCycle):
 
     def _way(self) -> Iterator[BusEvent]:
         """Events of the last byte's path to each device, through it, and back."""
-        way, device = [], 0
+        way: list[BusEvent] = []
+        back: list[BusEvent] = []
+        device = 0
         for group in self.network.groups:
             to_us, through_us = cable_us(group.node.cable_length_m) / 2, hop_us(group) / 2
             for _ in range(int(group.nodes)):
                 device += 1
-                way += [
-                    BusEvent("cable", "cycle_cable_us", to_us, f"cable to device {device}", device, "way"),
-                    BusEvent("device", "cycle_devices_us", through_us, f"way to device {device}", device, "way"),
+                cable = BusEvent("cable", "cycle_cable_us", to_us, f"cable to device {device}", device, "way")
+                through = BusEvent("device", "cycle_devices_us", through_us, f"way to device {device}", device, "way")
+                way += [cable, through]
+                back += [
+                    cable._replace(label=f"cable back from device {device}"),
+                    through._replace(label=f"way back from device {device}"),
                 ]
         yield from way
-        yield from (part._replace(label=part.label.replace("to", "back from", 1)) for part in reversed(way))
+        yield from reversed(back)
 
     def figures(self) -> Mapping[str, Number | None]:
         """Frames, process data, time of the last command, time of SYNC0, and the mean load."""

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from busplan.buses.figure import BusFigures, read_figures
-from busplan.buses.published import Spread, published, rows_of
+from busplan.buses.published import Spread, data_file, rows_of
 from busplan.elementwise import Number, choose, larger
 from busplan.sourced import Constants
 
@@ -30,7 +30,7 @@ LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
 c: Final = Constants("busplan.buses.ethercat")
 """Constants with a source, by their names."""
 
-_TX: Final = Spread.of(published("ethercat")["delays"]["tx_one_way_us"])
+_TX: Final = Spread.of(data_file("ethercat")["delays"]["tx_one_way_us"])
 c.computed("DELAY_US[100BASE-TX]", lambda _: _TX.mean)
 c.computed("DELAY_UNCERTAINTY_US[100BASE-TX]", lambda _: _TX.uncertainty)
 c.computed("MEASURED_DELAY_UNCERTAINTY_US", lambda _: 0.010 / 12**0.5)

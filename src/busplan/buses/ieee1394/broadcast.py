@@ -21,6 +21,7 @@ from busplan.buses.ieee1394.constants import (
     padded_bytes,
 )
 from busplan.buses.ieee1394.cycle import CycleWithStarts
+from busplan.buses.ieee1394.doubts import ACKNOWLEDGED, CONCATENATED, UNACKNOWLEDGED
 from busplan.buses.ieee1394.timing import IdleTime, Phases, Responder, idle_time, transaction
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, is_off, larger, step, total
@@ -242,8 +243,10 @@ class BroadcastCycle(CycleWithStarts):
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubt of each input that is not known exactly."""
         retries, nodes = self.network.profile.cycle.retries, self.network.nodes
-        # PHY delays of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
-        hop_delays = 3 + 2 * nodes + 5 + 3 + 3 * retries + 2 * self.number_of_starts
+        query = write = retry = hub_request = ACKNOWLEDGED
+        broadcast = start = UNACKNOWLEDGED
+        hub = hub_request + CONCATENATED
+        hop_delays = query + broadcast * nodes + hub + write + retry * retries + start * self.number_of_starts
         return doubts.of_inputs(
             residual_us=self.halves * doubts.residual().uncertainty_us,
             gap_term_us=self.with_gap * doubts.gap_term_us(self.link.gap_count),

@@ -13,6 +13,7 @@ from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
     c,
 )
+from busplan.buses.ieee1394.doubts import ACKNOWLEDGED, UNACKNOWLEDGED
 from busplan.buses.ieee1394.figures import LATENCY, READS, SYNC, TERMS, WRITES
 from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import (
@@ -37,6 +38,12 @@ _PHASES: Final = by_key(LATENCY)
 
 def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
     return EventKind(key, label, _PHASES[phase].reference, mark, ink)
+
+
+def _name_phases(phases: Phases, suffix: str) -> None:
+    """Give the phases of a transaction their names in a derivation."""
+    for key, us in phases._asdict().items():
+        named(us, key, _PHASES[key].symbol + suffix)
 
 
 EVENTS: Final = (
@@ -303,16 +310,14 @@ class Ieee1394Cycle(CycleWithStarts):
     def _hops(self) -> tuple[GroupHops, ...]:
         if charges_own_hops(self.network):
             return group_hops(self.network)
-        return (GroupHops(*(self.link.hops,) * 3),) * len(self.network.groups)
+        return tuple(GroupHops.alike(self.link.hops) for _ in self.network.groups)
 
     def _exchanges(self, hops: Sequence[Number]) -> tuple[Exchange, ...]:
         """Transactions of all groups, each with a node at the given hops; a derivation tells their phases apart."""
         places = range(len(self.network.groups))
         exchanges = tuple(self._exchange(place, kind, hops[place]) for kind in TRANSACTION_KINDS for place in places)
         for sent in exchanges:
-            suffix = f",{sent.kind}{sent.group.name and f',{sent.group.name}'}"
-            for key, us in sent.phases._asdict().items():
-                named(us, key, _PHASES[key].symbol + suffix)
+            _name_phases(sent.phases, f",{sent.kind}{sent.group.name and f',{sent.group.name}'}")
         return exchanges
 
     def _exchange(self, place: int, kind: TransactionKind, hops: Number) -> Exchange:
@@ -380,8 +385,9 @@ class Ieee1394Cycle(CycleWithStarts):
         """Doubt of each input that is not known exactly."""
         if self.model == "paper":
             return ()
-        # Hops of the synchronous packet, of retries and of cycle starts; `of_cycle` adds those of the transactions.
-        hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * self.number_of_starts
+        # The synchronous packet, retries and cycle starts; `of_cycle` adds the transactions.
+        hop_delays = UNACKNOWLEDGED + ACKNOWLEDGED * self.network.profile.cycle.retries
+        hop_delays += UNACKNOWLEDGED * self.number_of_starts
         return doubts.of_cycle(self.exchanges, self.network, delays=self.delays, hop_delays=hop_delays)
 
     def longest(self, kind: TransactionKind) -> Phases:

@@ -27,6 +27,13 @@ from busplan.sourced import Sourced, cached
 _RECTANGULAR: Final = sqrt(3)
 """Ratio of half a range to its standard uncertainty (JCGM 100, 4.3.7)."""
 
+UNACKNOWLEDGED: Final = 2
+"""Delays over all hops in a packet without an acknowledge: of its arbitration and its data [1]."""
+ACKNOWLEDGED: Final = 3
+"""Delays over all hops in a packet with an acknowledge [1]."""
+CONCATENATED: Final = 2
+"""Delays over all hops in a concatenated response, which does not arbitrate: of its data and its acknowledge [1]."""
+
 
 class ModelResidual(NamedTuple):
     """Measured less computed time of half a transaction [us]."""
@@ -105,17 +112,17 @@ def of_cycle(
     `delays` are those to the farthest node. `hop_delays` counts how often the delay of all hops stands in the cycle
     outside its transactions [1].
     """
-    host_us: Number = network.profile.host.standard_uncertainty_us
+    host_doubt_us: Number = network.profile.host.standard_uncertainty_us
     split, other_halves = _split_halves(exchanges), _other_halves(exchanges, network)
     link, spread_us = delays.link, residual().uncertainty_us
     # A wrong reading errs by the same share everywhere, so signs count.
     of_split_us = total(halves * _split_gap_term_us(node, link.gap_count) for node, halves in split)
     of_packets = total(exchange.group.nodes * _hop_delays(exchange) for exchange in exchanges)
 
-    def busy_swing_us(exchange: Exchange, execution_us: Number, host_us: Number) -> Number:
+    def busy_swing_us(exchange: Exchange, execution_doubt_us: Number, host_doubt_us: Number) -> Number:
         """Change of a transaction by a standard uncertainty of its execution time or of the host's time [us]."""
         responder = exchange.responder
-        if is_off(execution_us if responder.answer == "split" else 0.0) and is_off(host_us):
+        if is_off(execution_doubt_us if responder.answer == "split" else 0.0) and is_off(host_doubt_us):
             return 0.0
         bound_us = responder.execution_us + responder.worst_extra_us
 
@@ -123,8 +130,8 @@ def of_cycle(
             between_us = between_packets_us(
                 responder.answer,
                 gaps=delays.gaps,
-                execution_us=bound_us + steps * execution_us if steps else bound_us,
-                host_us=responder.host_us + steps * host_us if steps else responder.host_us,
+                execution_us=bound_us + steps * execution_doubt_us if steps else bound_us,
+                host_us=responder.host_us + steps * host_doubt_us if steps else responder.host_us,
             )
             return named(between_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
 
@@ -145,7 +152,7 @@ def of_cycle(
         ),
         phy_delays=of_packets + hop_delays * link.hops,
         link=link,
-        host_us=total(exchange.group.nodes * busy_swing_us(exchange, 0.0, host_us) for exchange in exchanges),
+        host_us=total(exchange.group.nodes * busy_swing_us(exchange, 0.0, host_doubt_us) for exchange in exchanges),
     )
 
 

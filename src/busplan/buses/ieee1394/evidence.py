@@ -13,7 +13,7 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.doubts import residual
-from busplan.buses.published import published
+from busplan.buses.published import data_file
 
 
 def equation_15_constant_us(_cycle: object, *, nodes: int, gap_count: int, overhead_bytes: int, rounded: bool) -> float:
@@ -45,7 +45,7 @@ def gap_counts_met(_cycle: object, *, derived: bool) -> int:
 
     With `derived` they are computed from cable and PHY at the base rate; otherwise they are the program's table.
     """
-    table: Any = published("ieee1394")["gap_counts"]
+    table: Any = data_file("ieee1394")["gap_counts"]
 
     def computed(hops: int) -> float:
         if not derived:

@@ -125,6 +125,7 @@ LIMITS: Final = (
         way_out="reduce bus.isochronous_us, or stop the cycle master",
     ),
     UnknownArbitration(),
+    # The safe gap count is the value and that in force the bound: a smaller one than the safe one is unsafe.
     ExactLimit(
         "gap table",
         unsafe_words,

@@ -3,11 +3,11 @@
 `paper` takes the equations as published: gaps and PHY delays are counted in the data rate, both packets of a
 transaction carry the payload and the same overhead, and both gaps follow every transaction. `standard` counts gaps and
 PHY delays in the base rate, as the gap tables of three independent stacks show, gives every packet its real size on the
-wire, and takes the gaps as thresholds of an idle period. Only operators are used, as in `equations`: floats in, floats
-out; arrays in, arrays out.
+wire, and takes the gaps as thresholds of an idle period. Floats in, floats out; arrays in, arrays out: the operators
+and the functions of `elementwise` take both.
 """
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
@@ -68,6 +68,27 @@ class Delays(NamedTuple):
     arbitration_hops: Number
     """Cable hops that an arbitration is charged [1]."""
 
+    @classmethod
+    def of(cls, link: Link, *, clock_mbit_s: Number, gaps: Gaps, hop_us: Number) -> Self:
+        """Delays over all hops of a link."""
+        if link.has_gaps:
+            arbitration_us = equations.arbitration_phase_us(
+                link.hops, hop_us=hop_us, gap_count=link.gap_count, gap_clock_mbit_s=clock_mbit_s
+            )
+            acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(link.hops, hop_us=hop_us))
+        else:
+            arbitration_us = c.BETA_ARBITRATION_US
+            acknowledge_us = c.BETA_ACKNOWLEDGE_US
+        return cls(
+            link=link,
+            clock_mbit_s=clock_mbit_s,
+            gaps=gaps,
+            hop_us=hop_us,
+            arbitration_us=named(arbitration_us, "arbitration_us", "ArbP"),
+            acknowledge_us=named(acknowledge_us, "acknowledge_us", "T_ack"),
+            arbitration_hops=link.hops,
+        )
+
     def data_us(self, packet_bytes: Number) -> Number:
         """Data phase of a packet over the link [us]."""
         link = self.link
@@ -77,20 +98,8 @@ class Delays(NamedTuple):
 
     def over(self, hops: Number) -> "Delays":
         """These delays over another number of hops of the same bus."""
-        if self.link.has_gaps:
-            arbitration_us = equations.arbitration_phase_us(
-                hops, hop_us=self.hop_us, gap_count=self.link.gap_count, gap_clock_mbit_s=self.clock_mbit_s
-            )
-            acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(hops, hop_us=self.hop_us))
-        else:
-            arbitration_us = c.BETA_ARBITRATION_US
-            acknowledge_us = c.BETA_ACKNOWLEDGE_US
-        return self._replace(
-            link=self.link._replace(hops=hops),
-            arbitration_us=named(arbitration_us, "arbitration_us", "ArbP"),
-            acknowledge_us=named(acknowledge_us, "acknowledge_us", "T_ack"),
-            arbitration_hops=hops,
-        )
+        link = self.link._replace(hops=hops)
+        return Delays.of(link, clock_mbit_s=self.clock_mbit_s, gaps=self.gaps, hop_us=self.hop_us)
 
 
 def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Delays:
@@ -103,7 +112,8 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
         beta_phy_us = c.BETA_PHY_DELAY_US if link.phy_delay_us is None else link.phy_delay_us
         hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=beta_phy_us)
         # Not every node need have a packet before the next one: only the way to a node and back is surely waited for.
-        return Delays(link, rate_mbit_s, Gaps(0.0, 0.0, 0.0, alone), hop_us, 0.0, 0.0, 0).over(0)
+        own, gaps = link._replace(hops=0), Gaps(0.0, 0.0, 0.0, alone)
+        return Delays.of(own, clock_mbit_s=rate_mbit_s, gaps=gaps, hop_us=hop_us)
     clock_mbit_s = rate_mbit_s if model == "paper" else c.BASE_RATE_MBIT_S
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
     gaps = Gaps(
@@ -113,7 +123,7 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
         alone,
     )
     hop_us = equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us)
-    return Delays(link, clock_mbit_s, gaps, hop_us, 0.0, 0.0, 0).over(link.hops)
+    return Delays.of(link, clock_mbit_s=clock_mbit_s, gaps=gaps, hop_us=hop_us)
 
 
 class Responder(NamedTuple):

@@ -1,7 +1,7 @@
 """Settings of the bus that its packets depend on, and the transactions of the individual schedule."""
 
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 from busplan.buses.cycle import BusEvent
 from busplan.buses.ieee1394.constants import BETA_SPEEDS, c, safe_gap_count
@@ -79,16 +79,23 @@ class GroupHops(NamedTuple):
     mean: Number
     """Mean hops: times are linear in the hops, so `nodes` times the mean is the group's sum."""
     last: Number
+    are_alike: bool = False
+    """Whether all nodes have the same hops."""
+
+    @classmethod
+    def alike(cls, hops: Number) -> Self:
+        """The same hops for all nodes of a group."""
+        return cls(hops, hops, hops, are_alike=True)
 
     def of_node(self, place: Number) -> Number:
         """Hops of the node at a place in its group, counted from 0; at the mean place the mean hops [1]."""
-        return self.first if self.first is self.last else self.first + place
+        return self.first if self.are_alike else self.first + place
 
 
 def group_hops(network: Network) -> tuple[GroupHops, ...]:
     """Hops of each group [1]: in a chain the places of its nodes, in a tree the group's `hops`, else 1."""
     if network.profile.bus.max_hops is not None:
-        return tuple(GroupHops(*(getattr(group.node, "hops", None) or 1,) * 3) for group in network.groups)
+        return tuple(GroupHops.alike(getattr(group.node, "hops", None) or 1) for group in network.groups)
     chain: list[GroupHops] = []
     for group in network.groups:
         hops = GroupHops(1, (group.nodes + 1) / 2, group.nodes)

@@ -187,7 +187,7 @@ def finite(value: object, *, name: str) -> float:
     return float(number)
 
 
-def whole(value: object, *, name: str) -> int:
+def whole_number(value: object, *, name: str) -> int:
     """A whole number from 1 to the largest count in a profile. Anything else raises BusplanError."""
     number = from_numpy(value)
     if type(number) is not int or not 1 <= number <= MAX_COUNT:

@@ -83,10 +83,10 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
 
-def checked_against(tested: Tested, *, has_cycle: bool = True) -> str:
-    """Parts of a bus model that published figures test, and those that were never measured."""
+def checked_against(tested: Tested, *, with_untested: bool = True) -> str:
+    """Parts of a bus model that published figures test, and, unless they are left out, those never measured."""
     parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
-    never = f"never measured: {', '.join(tested.untested)}" if tested.untested and has_cycle else ""
+    never = f"never measured: {', '.join(tested.untested)}" if tested.untested and with_untested else ""
     return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
@@ -240,10 +240,13 @@ def figure_table(
     """
     equation = TableColumn("eq", kind="words", rank=_DROPPED_FIRST, is_detail=hides_equations)
     head = [TableColumn("figure", kind="words"), equation]
-    head += [TableColumn("unit", kind="words")] if unit else []
+    if unit:
+        head.append(TableColumn("unit", kind="words"))
     shown = []
     for figure, level in rows:
-        words = (figure.label, figure.reference, figure.column or figure.unit)[: len(head)]
+        words = [figure.label, figure.reference]
+        if unit:
+            words.append(figure.column or figure.unit)
         values = (_value(figure, column, state) for column in columns)
         shown.append(TableRow((*words, *values), level, is_detail=is_detail(figure)))
     # A narrow terminal splits the table into panels, each with the first columns again.

@@ -1,7 +1,7 @@
 """The verdict on one period, and its card: the lines that sum it up in every form of output."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, sqrt
 from typing import Final, NamedTuple
 
@@ -26,7 +26,7 @@ from busplan.questions.base.sentences import (
     used_us,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
-from busplan.questions.fit.cure import NODES, Changes, Cure, SettingForPeriod, Variant, Variants, cure
+from busplan.questions.fit.cure import NODES, AtPeriod, Changes, Cure, SettingForPeriod, Variants, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
@@ -54,9 +54,12 @@ class Change:
     """Figures after the change, under the model that decides."""
 
 
+_BLANK: Final = Card(Sentence(()), Words(""), None, ())
+
+
 @dataclass(frozen=True)
-class Judged:
-    """What is known of a network at one period, by the timing model that decides."""
+class Verdict:
+    """Verdict on one period, by the timing model that decides."""
 
     setup: tuple[str, ...]
     """Settings of the bus in force, each in a few words."""
@@ -91,6 +94,10 @@ class Judged:
     or if no change is enough."""
     no_change: str
     """Why there is no change, if one was looked for."""
+    card: Card = _BLANK
+    """Subject, verdict and the lines that sum it up; they are written from the rest of the verdict."""
+    brief_card: Card = _BLANK
+    """The same without the lines that are alike for every period."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -108,17 +115,7 @@ class Judged:
         return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
 
 
-@dataclass(frozen=True)
-class Verdict(Judged):
-    """Verdict on one period, by the timing model that decides."""
-
-    card: Card
-    """Subject, verdict and the lines that sum it up."""
-    brief_card: Card
-    """The same without the lines that are alike for every period."""
-
-
-class _Judged(NamedTuple):
+class _Trials(NamedTuple):
     """What is known of a network before the figures of what it could become."""
 
     deciding: CapacityFigures
@@ -147,14 +144,14 @@ def verdicts_of(
         Called now and then with the networks that are judged, and all of them.
     """
     variants: dict[object, Variants] = {}
-    judged = []
+    trials = []
     for number, (point, figures) in enumerate(zip(points, results, strict=True)):
         progress(number, len(points))
         shared = variants.setdefault(point.without(PERIOD), Variants(point.network))
-        judged.append(_judged(point.network, figures, shared))
-    mended = _fits_after(points, [one.mended for one in judged])
-    resets = _fits_after(points, [one.reset for one in judged])
-    rows = zip(results, judged, mended, resets, strict=True)
+        trials.append(_trials(point.network, figures, shared))
+    mended = _fits_after(points, [one.mended for one in trials])
+    resets = _fits_after(points, [one.reset for one in trials])
+    rows = zip(results, trials, mended, resets, strict=True)
     return [_verdict(point.network, *row) for point, row in zip(points, rows, strict=True)]
 
 
@@ -170,35 +167,35 @@ def _fits_after(points: Sequence[GridPoint], changed: Sequence[GridPoint | None]
     return [found.get(place) for place in range(len(points))]
 
 
-def _judged(network: Network, results: tuple[CapacityFigures, ...], variants: Variants) -> _Judged:
+def _trials(network: Network, results: tuple[CapacityFigures, ...], variants: Variants) -> _Trials:
     model = network.bus.deciding_model
     deciding = next((result for result in results if result.timing_model == model), None) or capacity_figures(
         network, model=model
     )
     missed = missed_limits(network)
-    mending, mended = _change(Variant(network, variants), deciding, is_missed=bool(missed))
+    mending, mended = _change(AtPeriod(network, variants), deciding, is_missed=bool(missed))
     after = reset(network, deciding)
     of_reset = None if after is None else GridPoint(dict(network.bus.safety.after_reset), after)
-    return _Judged(deciding, variants, missed, mending, mended, of_reset)
+    return _Trials(deciding, variants, missed, mending, mended, of_reset)
 
 
 def _verdict(
     network: Network,
     results: tuple[CapacityFigures, ...],
-    known: _Judged,
+    trials: _Trials,
     mended: FitFigures | None,
     after_reset: FitFigures | None,
 ) -> Verdict:
-    bus, deciding, variants, mending = network.bus, known.deciding, known.variants, known.mending
+    bus, deciding, variants, mending = network.bus, trials.deciding, trials.variants, trials.mending
     cycle = bus.cycle(network, model=bus.deciding_model)
-    judged = Judged(
+    verdict = Verdict(
         setup=bus.setup_words(network),
         counted=bus.counted(network),
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
         broken_limits=words_behind(deciding, network),
-        missed_limits=known.missed,
+        missed_limits=trials.missed,
         fastest=variants.fastest if network.groups else None,
         best_register=variants.best_register if network.groups else None,
         after_reset=None if after_reset is None or after_reset.verdict == FITS else after_reset,
@@ -209,16 +206,16 @@ def _verdict(
         change=None if mended is None else Change(mending.changes or {}, mended.nodes, mended),
         no_change=mending.why,
     )
-    card, brief_card = _cards(judged, network, bus_lines=cycle.card_lines(is_shown_to_fit))
-    return Verdict(**vars(judged), card=card, brief_card=brief_card)
+    card, brief_card = _cards(verdict, network, bus_lines=cycle.card_lines(is_shown_to_fit))
+    return replace(verdict, card=card, brief_card=brief_card)
 
 
-def _change(target: Variant, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, GridPoint | None]:
+def _change(target: AtPeriod, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, GridPoint | None]:
     """The change that mends what is wrong or makes room on a full bus for one more node, and the network after it."""
     more: Changes = {}
     if now.verdict == FITS and now.safe and not is_missed:
         if now.safe_nodes is None or now.safe_nodes > now.nodes:
-            return Cure(None), None  # there is room, or nobody said which of the groups is to grow
+            return Cure({}), None  # there is room, or nobody said which of the groups is to grow
         if now.safe_nodes == MAX_COUNT:
             return Cure(None, f"{MAX_COUNT} nodes are the most that a profile can have"), None
         more = {NODES: now.safe_nodes + 1}
@@ -244,7 +241,7 @@ _CARD_WORDS: Final = 62
 _Line = tuple[str, Sentence]
 
 
-def _cards(verdict: Judged, network: Network, *, bus_lines: Iterable[tuple[str, str]]) -> tuple[Card, Card]:
+def _cards(verdict: Verdict, network: Network, *, bus_lines: Iterable[tuple[str, str]]) -> tuple[Card, Card]:
     """Sum up the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
 
     The second card is without the lines that are alike for every period.
@@ -268,14 +265,14 @@ def _cards(verdict: Judged, network: Network, *, bus_lines: Iterable[tuple[str, 
     return brief._replace(lines=(*first, *basis, *last), details=details), brief
 
 
-def _word(verdict: Judged) -> Words:
+def _word(verdict: Verdict) -> Words:
     word = verdict.deciding.verdict
     but = "" if verdict.all_well or word != FITS else ", BUT"
     state: State = "passes" if verdict.all_well else "fails" if word == DOES_NOT_FIT or but else "warns"
     return Words(f"{(word or '').upper()}{but}", state)
 
 
-def _gauge(verdict: Judged, network: Network) -> Gauge | None:
+def _gauge(verdict: Verdict, network: Network) -> Gauge | None:
     figures = verdict.deciding
     state: State = "passes" if figures.verdict == FITS else "fails"
     if network.groups:
@@ -295,7 +292,7 @@ def _gauge(verdict: Judged, network: Network) -> Gauge | None:
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 
 
-def _reasons(verdict: Judged) -> Iterator[_Line]:
+def _reasons(verdict: Verdict) -> Iterator[_Line]:
     """Reasons other than time why the machine does not run as the profile has it."""
     for words in verdict.broken_limits:
         yield "limit", Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
@@ -307,12 +304,12 @@ def _reasons(verdict: Judged) -> Iterator[_Line]:
         yield from (("[limits]", Sentence((words,), "fails")) for words in reversed(first.values()))
 
 
-def _times(verdict: Judged, network: Network) -> Iterator[_Line]:
+def _times(verdict: Verdict, network: Network) -> Iterator[_Line]:
     yield from time_lines(verdict.deciding, network.profile)
     yield "fastest period", _fastest(verdict, network.bus)
 
 
-def _fastest(verdict: Judged, bus: Bus) -> Sentence:
+def _fastest(verdict: Verdict, bus: Bus) -> Sentence:
     fastest, best = verdict.fastest, verdict.best_register
     with_best = ""
     if best is not None:
@@ -333,7 +330,7 @@ def _limit_label(bus: Bus, key: str | None) -> str:
     return (limit and limit.label) or str(key)
 
 
-def _rounded_up(verdict: Judged, us: float, bus: Bus) -> str:
+def _rounded_up(verdict: Verdict, us: float, bus: Bus) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not bus.periods.us:
         scale = 10.0 ** known_decimals(us, verdict.deciding.uncertainty_us)
@@ -341,7 +338,7 @@ def _rounded_up(verdict: Judged, us: float, bus: Bus) -> str:
     return period(us)
 
 
-def _room(verdict: Judged, network: Network) -> Iterator[_Line]:
+def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
     """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     if verdict.all_well and verdict.has_room:
@@ -378,7 +375,7 @@ def _more(count: GroupCapacity, number: int) -> str:
     return f"{number:,} more {nouns(number, 'node')}: {', '.join(in_all)} in all"
 
 
-def _beside_limit(verdict: Judged, why: str) -> str | None:
+def _beside_limit(verdict: Verdict, why: str) -> str | None:
     """What a reason says beside the words of a limit that stand on the card already; None where it has other words."""
     for words in verdict.broken_limits:
         if why.startswith(words):
@@ -398,7 +395,7 @@ def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
     return text
 
 
-def _buses(verdict: Judged, bus: Bus) -> Iterator[_Line]:
+def _buses(verdict: Verdict, bus: Bus) -> Iterator[_Line]:
     """How many such buses would carry all nodes, where one is not shown to."""
     figures = verdict.deciding
     most = figures.safe_nodes or 0
@@ -409,7 +406,7 @@ def _buses(verdict: Judged, bus: Bus) -> Iterator[_Line]:
         yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
 
 
-def _basis(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Line]:
+def _basis(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
     """The largest part and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
     figures = verdict.deciding
     if figures.terms:
@@ -431,7 +428,7 @@ def _basis(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Line]
         yield "never measured", Sentence((never,))
 
 
-def _details(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Line]:
+def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
     """What the answer needs only when somebody asks: the correction, the published figures, other models."""
     figures = verdict.deciding
     if figures.bias_us:
@@ -440,12 +437,12 @@ def _details(verdict: Judged, network: Network, tested: Tested) -> Iterator[_Lin
     elif network.groups and figures.bias_us is None:
         (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
         yield "correction", Sentence((f"none: {error}",))
-    yield "checked against", Sentence((checked_against(tested, has_cycle=False),))
+    yield "checked against", Sentence((checked_against(tested, with_untested=False),))
     for model, missing in verdict.not_applicable.items():
         yield f"{model} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
 
 
-def _caveats(verdict: Judged) -> Iterator[_Line]:
+def _caveats(verdict: Verdict) -> Iterator[_Line]:
     """What speaks against the verdict at its period: another model, a bus reset, a warning."""
     deciding = verdict.deciding
     for other in verdict.others:

@@ -15,7 +15,7 @@ from busplan.questions.base.arguments import (
     ProfileLike,
     load_network,
     one_or_several,
-    whole,
+    whole_number,
     with_its_constants,
 )
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -206,7 +206,7 @@ class CircleTestAnswer(Answer):
         from busplan.forms.csv_rows import csv_blocks
         from busplan.questions.circle.report import TRACE_COLUMNS, trace_records
 
-        return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
+        return csv_blocks(trace_records(self, every=whole_number(every, name="every")), columns=TRACE_COLUMNS)
 
     def drawing(self) -> Drawing:
         """Drawing of the magnified circle, its error over time and the ranked error sources.

@@ -13,7 +13,7 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle
 from busplan.buses.limits import COVERAGE
-from busplan.buses.published import Tested, parts_tested, published
+from busplan.buses.published import Tested, data_file, parts_tested
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -132,7 +132,7 @@ def sections_of(bus: Bus, data: str, *, progress: Progress | None = None) -> Ite
             cases[key] = _Case(row, progress)
         return cases[key]
 
-    for content in published(data).get("evidence", ()):
+    for content in data_file(data).get("evidence", ()):
         with _placed(f"{data}.toml: [[evidence]] {content.get('title')!r}"):
             table = _Table.model_validate(content)
             rows = list(_rows(table))

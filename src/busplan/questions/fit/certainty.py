@@ -30,17 +30,6 @@ def available_us(network: Network) -> Number:
     return time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
 
 
-def fits_in(required_us: Number, *, available_us: Number) -> Number:
-    """Tell whether a cycle fits the available time; a cycle that fills it exactly fits.
-
-    Examples
-    --------
-    >>> fits_in(0.1 + 0.2, available_us=0.3)
-    True
-    """
-    return within(required_us, available_us)
-
-
 class Certainty(NamedTuple):
     """Margin of a cycle with its bias and uncertainty [us]. The numbers may be arrays or traced numbers."""
 
@@ -96,7 +85,7 @@ def limit_codes(network: Network) -> dict[str, Number]:
 def time_code(cycle: Certainty, network: Network) -> Number:
     """Verdict on the time limit, as an index of `VERDICTS`, from the certainty of a network's cycle."""
     given_us = available_us(network)
-    is_shown = fits_in(cycle.safe_required_us, available_us=given_us)
+    is_shown = within(cycle.safe_required_us, given_us)
     highest_margin_us: Number = cycle.margin_corrected_us + cycle.uncertainty_us + cycle.possible_us
     is_broken = highest_margin_us < -FIT_ROUNDING * given_us
     return choose(is_shown, KEPT, choose(is_broken, BROKEN, NOT_SHOWN_KEPT))

@@ -7,7 +7,8 @@ from typing import Any, Final, Literal
 
 from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
-from busplan.questions.fit.certainty import available_us, deciding_cycle, fits_in
+from busplan.elementwise import within
+from busplan.questions.fit.certainty import available_us, deciding_cycle
 from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -102,7 +103,7 @@ def refusals(network: Network) -> tuple[Refused, ...]:
     if not network.groups:
         return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
     causes = (*_slow_setpoints(network), *_long_bus_delay(network))
-    fits = fits_in(deciding_cycle(network).required_us, available_us=available_us(network))
+    fits = within(deciding_cycle(network).required_us, available_us(network))
     if not fits or network.bus.broken(network):
         return causes
     return (*causes, *_servo_refusals(network, is_loop_refused=bool(causes)))

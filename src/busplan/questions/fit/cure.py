@@ -105,7 +105,7 @@ class Variants:
         return best_register(self.network, self.fastest)
 
 
-class Variant(NamedTuple):
+class AtPeriod(NamedTuple):
     """A network at its period, and what it shares with itself at other periods."""
 
     network: Network
@@ -263,7 +263,7 @@ def search(
     list
         The steps from the network as it is; the last one holds, or nothing of the levels is enough.
     """
-    now = start = Variant.of(network, variants)
+    now = start = AtPeriod.of(network, variants)
     steps = [PlanStep(None, {}, tuple(start.unmet()))]
     changes: list[Changes] = []
     for freedom in levels:
@@ -288,7 +288,7 @@ def search(
     return steps
 
 
-def _needed(start: Variant, changes: list[Changes]) -> list[Changes]:
+def _needed(start: AtPeriod, changes: list[Changes]) -> list[Changes]:
     """The changes without those that are not needed beside the last, the dearest first."""
     left = list(changes)
     for change in changes[-2::-1]:
@@ -302,7 +302,7 @@ def _together(changes: Sequence[Changes]) -> Changes:
     return {key: value for change in reversed(changes) for key, value in change.items()}
 
 
-def _with(start: Variant, changes: Sequence[Changes]) -> Variant:
+def _with(start: AtPeriod, changes: Sequence[Changes]) -> AtPeriod:
     """The network after changes of which each was possible beside those before it."""
     after = start.after(_together(changes))
     if after is None:
@@ -316,7 +316,7 @@ def _lack(needs: Sequence[Need], network: Network) -> tuple[int, float]:
     return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
 
 
-def _values(freedom: Freedom, now: Variant, kept: Collection[str]) -> Iterator[Changes]:
+def _values(freedom: Freedom, now: AtPeriod, kept: Collection[str]) -> Iterator[Changes]:
     """Values of a network, the least change first, beside keys that must stay.
 
     Where none is enough, what helps most is among them.
@@ -337,7 +337,7 @@ def _values(freedom: Freedom, now: Variant, kept: Collection[str]) -> Iterator[C
     return (values for setting in settings for values in setting.values)
 
 
-def _ratios(now: Variant) -> Iterator[Changes]:
+def _ratios(now: AtPeriod) -> Iterator[Changes]:
     """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
     own, period_us = float(now.network.slice_ratio), float(now.network.period_us)
     slice_us = max((need.slice_us for need in now.unmet() if need.slice_us < inf), default=0.0)
@@ -346,24 +346,24 @@ def _ratios(now: Variant) -> Iterator[Changes]:
         yield {RATIO: ratio}
 
 
-def _payloads(now: Variant, kept: Collection[str]) -> Iterator[Changes]:
+def _payloads(now: AtPeriod, kept: Collection[str]) -> Iterator[Changes]:
     """The largest payload with which all constraints hold, or the smallest one: the larger of read and write is cut."""
     network, profile = now.network, now.network.profile
     payloads = network.bus.payloads(network)
     cuts = [_cut(group, kind) for group, kind in product(profile.node_groups, TRANSACTION_KINDS)]
     step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
     most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
-    sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
+    sizes = [size for size in range(step, most + 1, step) if _cut_to(profile, size, kept)]
     # No more bytes are needed where fewer are not enough, but where a table of execution times falls.
-    fits = bisect_left(sizes, x=True, key=lambda size: not now.holds(_within(profile, size, kept)))
+    fits = bisect_left(sizes, x=True, key=lambda size: not now.holds(_cut_to(profile, size, kept)))
     yield from (
-        (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _within(profile, size, kept)))
+        (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _cut_to(profile, size, kept)))
         if sizes
         else ()
     )
 
 
-def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
+def _cut_to(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
     """The change to payloads of so many bytes or less; empty where they are, None where that cannot be."""
     changes: dict[str, Value] = {}
     for group, kind in product(profile.node_groups, TRANSACTION_KINDS):
@@ -382,7 +382,7 @@ def _cut(group: ProfileGroup, kind: TransactionKind) -> tuple[str, int]:
     return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
 
 
-def _periods(now: Variant) -> Iterator[Changes]:
+def _periods(now: AtPeriod) -> Iterator[Changes]:
     """The period nearest to the own one at which all constraints hold: rounded up, or the next that the bus allows."""
     least_us = now.variants.smallest.us
     if least_us is None:
@@ -392,22 +392,22 @@ def _periods(now: Variant) -> Iterator[Changes]:
         allowed = (us for us in periods.us if us >= least_us)
         yield from ({PERIOD: us} for us in sorted(allowed, key=lambda us: abs(us - own_us)))
     else:
-        yield {PERIOD: min(rounded_up(max(least_us, own_us)), MAX_TIME_US)}
+        yield {PERIOD: min(rounded_period_us(max(least_us, own_us)), MAX_TIME_US)}
 
 
-def rounded_up(us: float) -> float:
-    """A time rounded up to three significant digits, float rounding aside [us].
+def rounded_period_us(us: float) -> float:
+    """A period rounded up to three significant digits, float rounding aside [us].
 
     Examples
     --------
-    >>> rounded_up(1087.2), rounded_up(123.4), rounded_up(1100.0)
+    >>> rounded_period_us(1087.2), rounded_period_us(123.4), rounded_period_us(1100.0)
     (1090.0, 124.0, 1100.0)
     """
     context = Context(prec=_PERIOD_DIGITS, rounding=ROUND_CEILING)
     return float(context.create_decimal(Decimal(us * (1 - FIT_ROUNDING))))
 
 
-def _fewer_nodes(now: Variant) -> Iterator[Changes]:
+def _fewer_nodes(now: AtPeriod) -> Iterator[Changes]:
     """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
     counts = range(int(now.network.nodes) - 1, 0, -1)
     place = bisect_left(counts, x=True, key=lambda nodes: now.holds({NODES: nodes}))

@@ -12,7 +12,7 @@ from busplan.buses.figure import BusFigures
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Held, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total
+from busplan.elementwise import Number, choose, existing, is_everywhere, larger, rounded_down, smaller, total, within
 from busplan.questions.fit.certainty import (
     FITS,
     NOT_SHOWN,
@@ -22,7 +22,6 @@ from busplan.questions.fit.certainty import (
     VerdictWord,
     available_us,
     certainty,
-    fits_in,
     limit_codes,
     limits_to_be_safe,
     limits_with_time,
@@ -473,7 +472,7 @@ def fit_numbers(network: Network, *, model: str) -> FitNumbers:
     numbers: dict[str, Number | None] = {**numeric_figures(cycle)}
     terms, codes = cycle.terms if has_cycle else (), limit_codes(network)
     doubts: tuple[Doubt, ...] = ()
-    late = fits_in(cycle.required_us, available_us=available_us(network)) == 0 if has_cycle else False
+    late = within(cycle.required_us, available_us(network)) == 0 if has_cycle else False
     broken = {**{key: code == BROKEN for key, code in codes.items()}, TIME: late}
     if model == bus.deciding_model:
         certain = certainty(cycle)
@@ -483,7 +482,7 @@ def fit_numbers(network: Network, *, model: str) -> FitNumbers:
         numbers |= dict.fromkeys(_CERTAINTY_KEYS)
     own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
     own |= {term.key: term.us for term in terms}
-    unsafe = total(limit.is_broken(network) for limit in bus.limits if limit.role == "safety") > 0
+    unsafe = total(limit.is_surely_broken(network) for limit in bus.limits if limit.role == "safety") > 0
     return FitNumbers(bus.kind, bus.figures, bus.safety, model, numbers, own, terms, doubts, codes, broken, unsafe)
 
 
@@ -564,7 +563,7 @@ def margin_us(required_us: Number, *, available_us: Number) -> Number:
     """Margin of a cycle: the available time less the required time [us]."""
     spare_us = available_us - required_us
     # A cycle that fits only within rounding has a margin of 0, not a negative one.
-    fits = fits_in(required_us, available_us=available_us)
+    fits = within(required_us, available_us)
     return choose(spare_us < 0, choose(fits, 0.0, spare_us), spare_us)
 
 

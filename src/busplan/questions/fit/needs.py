@@ -177,7 +177,7 @@ def unmet(network: Network, needs: Iterable[Need] | None = None) -> list[Need]:
         Its `needs_of`, if they are known.
     """
     limits = network.bus.limits
-    broken = [limit for limit in limits if limit.role == "period" and limit.is_broken(network)]
+    broken = [limit for limit in limits if limit.role == "period" and limit.is_surely_broken(network)]
     found = list(_unmet(needs_of(network) if needs is None else needs, network))
     if not broken and not found:
         # What a limit needs of the slice was computed at the shortest period.

@@ -413,7 +413,7 @@ def design_value(key: str, profile: Profile) -> Any:
 def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
     """The verdict of `capacity` at a setting, before any circle test."""
     safety = () if fit.safe else (limit for limit in network.bus.limits if limit.role == "safety")
-    unsafe = tuple(limit.key for limit in safety if limit.is_broken(network))
+    unsafe = tuple(limit.key for limit in safety if limit.is_surely_broken(network))
     verdict: Any = fit.verdict  # there is one under the timing model that decides
     state: State = verdict
     limits: tuple[str, ...] = () if verdict == FITS else fit.behind or (TIME,)

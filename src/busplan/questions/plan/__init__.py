@@ -11,7 +11,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.profile.changes import KeyChange, KeyChanges
-from busplan.profile.edit import whole as as_whole
+from busplan.profile.edit import whole
 from busplan.profile.kinds import flat
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import (
@@ -22,7 +22,7 @@ from busplan.questions.base.arguments import (
     load_profile,
     require_cycle,
     values_by_key,
-    whole,
+    whole_number,
     with_its_constants,
 )
 from busplan.questions.base.sentences import change_meanings
@@ -137,7 +137,7 @@ class PlanAnswer(Answer):
         """The recommended changes as in a profile: "bus.nodes = 4, bus.gap_count = 10"; empty without any."""
         from busplan.questions.plan.report import settings
 
-        changes = {key: as_whole(value) for key, value in (self.recommended_changes or {}).items()}
+        changes = {key: whole(value) for key, value in (self.recommended_changes or {}).items()}
         written: dict[str, Any] = dict(flat(changes))
         return sentence_text(settings(self.meanings, written)) if written else ""
 
@@ -222,7 +222,7 @@ def plan(
         loaded, kept = KeyChanges(constants).applied(loaded), KeyChanges(kept).of_profile.entries
     with constants_changed(loaded.constants):
         if axes is not None:
-            kept = (_nodes(loaded, whole(axes, name="axes"), kept), *kept)
+            kept = (_nodes(loaded, whole_number(axes, name="axes"), kept), *kept)
         names = None if free is None else [str(name) for name in items(free, name="free")]
         return _plan(loaded, KeyChanges(kept), names)
 

@@ -13,7 +13,7 @@ from busplan.questions.base.arguments import (
     finite,
     load_profile,
     require_cycle,
-    whole,
+    whole_number,
     with_its_constants,
 )
 from busplan.questions.fit.network import network_of
@@ -89,7 +89,7 @@ def timeline(
     network = network_of(require_cycle(load_profile(profile), question="timeline"))
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(
-        schedule(network, model=model, number=None if cycle is None else whole(cycle, name="cycle")),
+        schedule(network, model=model, number=None if cycle is None else whole_number(cycle, name="cycle")),
         from_us=None if from_us is None else finite(from_us, name="from_us"),
         to_us=None if to_us is None else finite(to_us, name="to_us"),
         transaction=None if transaction is None else _transaction(transaction, network),
@@ -104,7 +104,7 @@ def _transaction(given: object, network: Network) -> tuple[str, int]:
             written = _TRANSACTION.fullmatch(text)
             kind, node = (written["kind"], int(written["node"])) if written else ("", 0)
         case (str() as kind, number):
-            node = whole(number, name="transaction")
+            node = whole_number(number, name="transaction")
             text = f"{kind}:{node}"
         case _:
             raise BusplanError(f'transaction {given!r}: expected one of one node, as ("read", 1)')

@@ -13,9 +13,9 @@ from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.limits import IDLE, EventKind
 from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
-from busplan.elementwise import Number, existing
+from busplan.elementwise import Number, existing, is_over
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import available_us, certainty, fits_in
+from busplan.questions.fit.certainty import available_us, certainty
 from busplan.questions.fit.figures import FitFigures, certainty_numbers, figures, margin_us, words_behind
 from busplan.questions.fit.network import model_names, warnings_of
 from busplan.sections.profile import Profile
@@ -212,7 +212,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
     end_us = events[-1].end_us
     # A rest that is only float rounding is no idle time.
-    if not fits_in(closed.available_us, available_us=end_us):
+    if is_over(closed.available_us, end_us):
         events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
     drawn = of_verdict.fullest if number is None else (number - 1) % cycles + 1
     return Schedule(
@@ -224,7 +224,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         from_us=0.0,
         to_us=events[-1].end_us,
         required_us=cycle.required_us,
-        overruns=not fits_in(cycle.required_us, available_us=closed.available_us),
+        overruns=bool(is_over(cycle.required_us, closed.available_us)),
         margin_us=margin_us(cycle.required_us, available_us=closed.available_us),
         **_certainty(cycle, model),
         needs=tuple(
