@@ -65,7 +65,7 @@ BAD_FILES: dict[str, tuple[bytes, str]] = {
         edited("read_bytes = 12", "read_bytes = 64"),
         "bad.toml:10:1: payload.read_bytes = 64: is outside the execution table, 4 to 32 bytes",
     ),
-    "10 MB of nested brackets": (b"[" * 10_000_000, "bad.toml:1:1: the file is larger than 2,000,000 bytes"),
+    "10 MB of nested brackets": (b"[" * 10_000_000, "bad.toml:1:1: the file is over 2,000,000 bytes"),
     "nested brackets in a file of the right size": (
         b"x = " + b"[" * 45_000 + b"]" * 45_000,
         "bad.toml:1:105: nested too deeply",
@@ -114,12 +114,12 @@ def test_standard_input_is_called_so_in_messages(refused: Refused) -> None:
         "<stdin>:1:2: not valid TOML: expected '=' after a key in a key/value pair, and the file ends"
     )
     assert refused("capacity", "-", stdin=b"\xff").startswith("<stdin>:1:1: not a text file")
-    assert refused("latency", "-", stdin=b"[" * 3_000_000).startswith("<stdin>:1:1: the file is larger than")
+    assert refused("latency", "-", stdin=b"[" * 3_000_000).startswith("<stdin>:1:1: the file is over")
     assert refused("latency", "-", stdin=b"").startswith("<stdin>:1:1: schema_version: missing key.")
 
 
 def test_a_file_that_never_ends_is_given_up(refused: Refused) -> None:
-    assert refused("capacity", "/dev/zero").startswith("/dev/zero:1:1: the file is larger than 2,000,000 bytes")
+    assert refused("capacity", "/dev/zero").startswith("/dev/zero:1:1: the file is over 2,000,000 bytes")
 
 
 @pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="no memory of its own below /dev")

@@ -159,7 +159,7 @@ def test_a_finding_says_the_value_the_limit_and_the_cheapest_cure() -> None:
         ("BP109", ["gap count 4", "3 hops", "smallest safe one is 8", "cheapest cure: bus.gap_count = 8"]),
         # 253.187 us less 177.992 us; 13 nodes are safe at gap count 63, and 14 at that of their hops.
         ("BP110", ["gap count 63", "7 that 2 hops need", "75.2 us", "wins 1 node"]),
-        ("BP111", ["13 bytes", "16 bytes travel", "say 16"]),
+        ("BP111", ["13 bytes", "16 bytes travel", "set the payload to 16"]),
         ("BP112", ["assumption", "measure it"]),
         # 253.187 us and a bias of 8 * 0.827 us, U 4.306 us.
         ("BP113", ["fits at 7", "does not fit at 63 after a bus reset", "-9.8 +/- 4.3 us", "bus manager"]),

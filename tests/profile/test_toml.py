@@ -179,7 +179,7 @@ FAULTS = {
     ),
     "missing key of the table": (
         *("time_us = [36.7, 36.3, 44.7]\n", ""),
-        ("18:7: node.execution.time_us: missing key. Execution time T_exec of each [us]; "
+        ("18:7: node.execution.time_us: missing key. Execution time T_exec at each payload [us]; "
         "for example time_us = [36.7, 36.3]"),
     ),
     "inline": (

@@ -388,11 +388,11 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
         (busplan.compare, "a network of messages alone has no cycle, which compare needs"),
         (busplan.map_, "a network of messages alone has no cycle, which a map of period and axes needs"),
         (lambda own: busplan.capacity(own, sensitivity=True), "messages alone has no cycle"),
-        (lambda own: busplan.capacity(own, period_us=4000), "messages alone has no cycle"),
+        (lambda own: busplan.capacity(own, period_us=4000), "messages alone have no cycle"),
         (lambda own: busplan.plan(own, axes=4), "which a plan for axes needs"),
         (busplan.circle_test, "messages alone have no axes that could move"),
         (lambda own: busplan.explain(own, "required_us"), "required_us: no equation leads to it"),
-        (lambda own: busplan.sweep(own, vary={"cycle.period_us": [1000]}), "messages alone has no cycle"),
+        (lambda own: busplan.sweep(own, vary={"cycle.period_us": [1000]}), "messages alone have no cycle"),
     ],
 )
 def test_what_asks_for_a_cycle_refuses_them(ask: Callable[[Any], Any], words: str) -> None:
