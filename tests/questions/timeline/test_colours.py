@@ -27,8 +27,9 @@ def test_a_term_has_the_colour_of_its_events(name: str) -> None:
                 kinds[event.term].add(bus.event_kind(event.kind))
     for term in bus.figures.terms:
         assert not kinds[term.key] or term.ink in {kind.ink for kind in kinds[term.key]}, term.key
-    inks = {each.key: each.ink for each in (*bus.figures.terms, *bus.stretch_kinds)}
+    terms = {term.key: term.ink for term in bus.figures.terms}
+    stretches = {stretch.key: stretch.ink for stretch in bus.stretch_kinds}
     for stretch, term_key in SAME.get(name, {}).items():
-        assert inks[stretch] == inks[term_key], stretch
+        assert stretches[stretch] == terms[term_key], stretch
     for kind in bus.event_kinds:
         assert kind.ink in {">": TO_NODES, "<": FROM_NODES}.get(kind.mark, {kind.ink}), kind.key
