@@ -164,7 +164,7 @@ def emulator_of(profile: Profile) -> Emulator:
     emulator = bus_of(profile).emulator()
     if emulator is None:
         kinds = listed([name for name in kind_names() if kind_named(name).emulator()], "and")
-        raise BusplanError(f"no recording of bus.kind {profile.bus.kind} is emulated, for none is read; {kinds} are")
+        raise BusplanError(f"emulate knows {kinds}, not {profile.bus.kind}")
     return emulator
 
 
