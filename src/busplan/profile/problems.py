@@ -20,6 +20,8 @@ from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
 _PERCENT: Final = 100
+_LEAST_PERCENT: Final = 2
+"""A share from here on is taken for a percentage."""
 _TAG: Final = "kind"
 """The key that selects the member of a union of tables."""
 _WRONG_TYPE: Final = {
@@ -186,7 +188,7 @@ def _expected(details: ErrorDetails) -> str:
 
 def _as_share(value: Any, most: float) -> str:
     """What a percentage is as a share, if one was given for it; else nothing."""
-    if most > 1 or not isinstance(value, int | float) or not 1 < value <= _PERCENT * most:
+    if most > 1 or not isinstance(value, int | float) or not _LEAST_PERCENT <= value <= _PERCENT * most:
         return ""
     return f"; it is a share: {value / _PERCENT:g} for {value:g} %"
 

@@ -464,7 +464,7 @@ def test_the_help_names_all_faults() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("paper-4ms", "-o", "x.log"), "bus.kind ieee1394 is emulated, for none is read; can and ethercat are"),
+        (("paper-4ms", "-o", "x.log"), "emulate knows can and ethercat, not ieee1394"),
         (("can-servo-8", "-o", "x.pcapng"), "--output x.pcapng: expected a name ending in .log, .candump"),
         (("ethercat-servo-8", "-o", "x.pcap"), "--output x.pcap: expected a name ending in .pcapng"),
         (("can-servo-8", "--fault", "jiter"), "there are missing-cycle, missing-pdo, double-pdo, late-command, jitter"),
