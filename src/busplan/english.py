@@ -8,8 +8,10 @@ _MOST_NEAR = 3
 """Near names in one question, at most."""
 
 
-def did_you_mean(typed: str, names: Iterable[str]) -> str:
+def did_you_mean(typed: str, names: Iterable[str], *, write: Callable[[str], str] = str) -> str:
     """Question about the nearest name, or about the names that begin as typed; empty if none is near.
+
+    `write` writes each name.
 
     Examples
     --------
@@ -23,7 +25,7 @@ def did_you_mean(typed: str, names: Iterable[str]) -> str:
     close = (
         [typed.casefold()] if typed.casefold() in folded else begun or get_close_matches(typed.casefold(), folded, 1)
     )
-    return f"did you mean {listed([folded[name] for name in close], 'or')}?" if close else ""
+    return f"did you mean {listed([write(folded[name]) for name in close], 'or')}?" if close else ""
 
 
 def has_controls(text: str) -> bool:

@@ -13,7 +13,7 @@ Run = Callable[..., CompletedProcess[str]]
 Refused = Callable[..., str]
 
 TOPICS = [
-    *("can", "circle", "commands", "ethercat", "gate", "import"),
+    *("commands", "can", "circle", "ethercat", "gate", "import"),
     *("json", "limits", "measured", "models", "plan", "polled", "profile", "python", "sercos"),
 ]
 

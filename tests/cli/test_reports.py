@@ -223,7 +223,10 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
         assert all(
             f"\n  {command}  " in done.stdout for command in ("latency", "capacity", "paper", "profiles", "init")
         )
-        assert "Exit codes: 0 done, 1 the plan fails, 2 could not" in " ".join(done.stdout.split())
+        assert (
+            "Exit codes: 0 done, 1 the answer is no (findings, no plan, a circle that fails), 2 could not"
+            in " ".join(done.stdout.split())
+        )
 
 
 @pytest.mark.parametrize(

@@ -216,4 +216,4 @@ def test_hundreds_of_nasty_files_in_one_call(tmp_path: Path) -> None:
     # Together they are judged as each alone.
     for number in range(0, len(names), 20):
         (alone,) = busplan.check(tmp_path / names[number], circle=False).files
-        assert document["files"][number]["findings"] == [finding._asdict() for finding in alone.findings]
+        assert document["files"][number]["findings"] == [finding.record for finding in alone.findings]

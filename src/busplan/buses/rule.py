@@ -33,6 +33,8 @@ class RuleProblem(NamedTuple):
     """The problem in words, or a function for words that are slow to write, not called for a suppressed problem."""
     help: str = ""
     cure: tuple[str, ...] = ()
+    weight: float = 0.0
+    """How much it matters among problems of its rule, of which text may have only the heaviest."""
 
 
 RuleFigures: TypeAlias = Any

@@ -25,8 +25,8 @@ app = typer.Typer(
 
     Example: busplan capacity paper-4ms
     """,
-    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted, 143 terminated, "
-    "129 hung up.",
+    epilog="Exit codes: 0 done, 1 the answer is no (findings, no plan, a circle that fails), 2 could not do the job, "
+    "130 interrupted, 143 terminated, 129 hung up.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

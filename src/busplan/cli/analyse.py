@@ -48,9 +48,10 @@ def capacity_command(
 
     It prints a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on this
     bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
-    change. --all adds every figure behind it. Times are in us. Exits 0 whatever the verdict.
+    change. In its bar # is used, ~ in doubt, . free, and r the reserve; | ends the slice. --all adds every figure
+    behind it. Times are in us. Exits 0 with any verdict.
 
-    Example: busplan capacity paper-4ms --period 4ms --period 500us
+    Example: busplan capacity paper-4ms --period 4ms,500us
     """
     if not sensitivity and call.form in PICTURES.values():
         raise BusplanError(f"{call.form_typed}: capacity draws what moves the margin; give --sensitivity, too")
@@ -72,7 +73,8 @@ def _next_commands(call: Call, result: "busplan.CapacityAnswer") -> "tuple[Comma
     changed = " ".join((shell_word(call.argument), *change_options(call.changes, period_us=profile_us), *tried))
     second = "circle-test" if all(verdict.all_well for verdict in result.verdicts) else "plan"
     more = "--all" if result.sensitivities else "--sensitivity"
-    commands = (f"capacity {changed} {more}", f"{second} {changed}", f"report {changed}")
+    page = shell_word(f"{'report' if call.argument == '-' else Path(call.argument).stem}.html")
+    commands = (f"capacity {changed} {more}", f"{second} {changed}", f"report {changed} -o {page}")
     return tuple(Command(f"busplan {command}") for command in commands)
 
 

@@ -54,7 +54,7 @@ _PERIODS: Final[Mapping[Periods, Any]] = MappingProxyType(
             typer.Option(
                 "--period",
                 metavar="TIME[,TIME...]",
-                help=f"{_PERIOD_HELP}, or several with commas{_PERIOD_DEFAULT}",
+                help=f"{_PERIOD_HELP}, or several with commas, as 4ms,500us{_PERIOD_DEFAULT}",
             ),
         ],
     }

@@ -106,8 +106,9 @@ def plan_command(
     """Find the settings for a number of nodes or axes: gap count, slice ratio, period, or several of them.
 
     It changes one thing at a time, the cheapest first and as little as possible, until the goal is shown to fit with
-    its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9;
-    the period changes only if nothing cheaper is enough. Values given by an option are kept.
+    its reserve, at a safe gap count, within all [limits]. The cheapest first is: gap_count, slice_ratio, responses,
+    schedule, payload, period, nodes. The slice ratio goes up to 0.9; the period changes only if nothing cheaper is
+    enough. Values given by an option are kept.
 
     The table has a row for each thing that was tried. Margins are in us, less the model's bias. Without a plan the
     answer names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a
@@ -491,8 +492,8 @@ def explore_command(
     """Write a page with sliders that shows what a change does: to the period, the nodes, the payload.
 
     Every setting is computed now, and the page shows its card and its place on the map: one file to open in a browser
-    or to send, without a server. Other forms show the map of this design. A key has up to 32 values; 5,000 settings in
-    all. Exits 0 whatever the verdict.
+    or to send, without a server. Without -o FILE.html it prints the map of this design. Up to 32 values each, 5,000
+    settings in all. Exits 0 with any verdict.
 
     Example: busplan explore gantry-24 -o gantry-24.html
     """

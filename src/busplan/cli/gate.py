@@ -19,7 +19,7 @@ from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.files import document_bytes, write_file
-from busplan.gate.formats import FORMATS
+from busplan.gate.formats import FORMATS, GateFormat
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
@@ -199,8 +199,16 @@ class _Written:
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on standard error.")] = False
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also name files without findings and skipped files.")
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Also list every BP112, and name files without findings and skipped files."
+        ),
     ] = False
+
+    @property
+    def chosen(self) -> GateFormat:
+        """The form; without --format, as a person at a terminal or a program behind a pipe reads it best."""
+        return FORMATS[self.format_ or ("full" if self.output is None and sys.stdout.isatty() else "concise")]
 
 
 @command(
@@ -239,11 +247,12 @@ def check_command(
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
-    Each finding is a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment `#
-    busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. A file that is not TOML or not
-    a profile is a finding, too. Options that are not given come from the nearest busplan.toml, or else from
-    [tool.busplan] of pyproject.toml. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could not do
-    the job, as with a missing file; the other files are still checked.
+    Each finding is a line: `path:line:column: CODE severity: message`; of BP112, an assumption, text shows the heaviest
+    of each file. `busplan rule CODE` explains it. A comment `# busplan: ignore[CODE] reason` on its line, or alone on
+    the line above, suppresses it. A file that is not TOML or not a profile is a finding, too. Options that are not
+    given come from the nearest busplan.toml, or else from [tool.busplan] of pyproject.toml. Exits 0 when clean, 1 with
+    findings at or above --fail-on, 2 when it could not do the job, as with a missing file; the other files are still
+    checked.
 
     Example: busplan check paper-1ms paper-4ms --format github
     """
@@ -273,7 +282,9 @@ def check_command(
             executor=crew,
             **arguments,
         )
-    _write(report._replace(lists_all=written.verbose), written)
+    lists_all = written.verbose or written.chosen.reader != "people"
+    report = report._replace(lists_all=lists_all)
+    _write(report, written)
     _say_findings(report, collection, written, selection)
     if baseline.pass_on_unmatched and report.unmatched:
         say(f"warning: {report.unmatched}")
@@ -364,9 +375,8 @@ def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "Ch
 
 
 def _write(report: "CheckReport", written: _Written) -> None:
-    """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
-    output = written.output
-    chosen = FORMATS[written.format_ or ("full" if output is None and sys.stdout.isatty() else "concise")]
+    """Write the report."""
+    output, chosen = written.output, written.chosen
     if output is not None:
         write_file(output, document_bytes(chosen.write(report)), overwrite=True)
     elif chosen.reader != "people":

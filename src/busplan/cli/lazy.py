@@ -1,5 +1,6 @@
 """Commands that are loaded when they are called, and the layout of their help: plain names, and exit codes."""
 
+import re
 import sys
 from collections.abc import Mapping
 from importlib import import_module
@@ -31,6 +32,8 @@ _WRONG: Final = MappingProxyType(
     }
 )
 """What is said of a value that typer refuses, by pydantic's type of error."""
+_UNIT: Final = re.compile(r"\[(kbit/s|bytes|%)\]")
+"""Unit of an option in its help."""
 
 
 def _in_words(error: Any) -> str:
@@ -46,6 +49,8 @@ def _in_words(error: Any) -> str:
             right = f"expected {listed(choices, 'or')}"
         else:
             right = _WRONG.get(refused["type"], "{msg}").format(**{**refused, **refused.get("ctx", {})})
+            unit = _UNIT.search(param.help or "")
+            right += f", in {unit[1]}" if unit and refused["type"].endswith("_parsing") else ""
         return f"{max(param.opts, key=len)} {refused['input']}: {right}; {hint}"
     if hasattr(error, "possibilities") and any("--set" in param.opts for param in error.cmd.params):
         # The beginning of an option of the command is more likely meant as that option.
@@ -53,6 +58,8 @@ def _in_words(error: Any) -> str:
         key = None if is_begun else _key_named(error.option_name.lstrip("-").replace("-", "_"))
         if key:
             words, hint = words.partition(" (")[0], f"--set {key}=... changes it for this run"
+        if key == "node.axes":
+            hint = "here --set bus.nodes=... (node.axes is the axes of one node); --axes is an option of plan"
     return f"{command}: {words[:1].lower()}{words[1:]}; {hint}"
 
 

@@ -32,7 +32,8 @@ def manual_command(
     topic: Annotated[
         str | None,
         typer.Argument(
-            autocompletion=complete_topic, help="Topic of a page, as profile.  [default: a list of all of them]"
+            autocompletion=complete_topic,
+            help="Topic of a page, as profile; start is the tour.  [default: a list of all of them]",
         ),
     ] = None,
     output: Annotated[Path | None, output_option("Write the page to FILE, always as Markdown")] = None,
@@ -44,9 +45,10 @@ def manual_command(
 
     Example: busplan manual profile
     """
-    from busplan.manual import page, topics
+    from busplan.manual import TOUR, page, topics
 
     headings = topics()
+    topic = TOUR if topic == "start" else topic
     if topic is not None and topic not in headings:
         from busplan.english import did_you_mean
 
@@ -56,7 +58,8 @@ def manual_command(
     if topic is None:
         width = max(map(len, headings))
         lines = (f"{name:{width}}  {heading}\n" for name, heading in headings.items())
-        text = f"Topics of the manual; `busplan manual TOPIC` shows one:\n\n{''.join(lines)}"
+        how = "`busplan manual TOPIC` shows one, `busplan manual start` the tour"
+        text = f"Topics of the manual; {how}:\n\n{''.join(lines)}"
     else:
         text = page(topic)
     if output is not None:

@@ -47,8 +47,9 @@ TimingModelOption = Annotated[
     typer.Option(
         "--timing-model",
         metavar="MODEL|both",
-        help="Timing model to report, by its name, or both. IEEE 1394 has paper, the paper's equations as published, "
-        "and standard, with the standard's clock and packets; other kinds have their own.",
+        help="Timing model whose figures are shown (by capacity with --all, in CSV and in JSON), by its name, or "
+        "both; the verdict is always by the model that decides. IEEE 1394 has paper, the paper's equations as "
+        "published, and standard, with the standard's clock and packets; other kinds have their own.",
     ),
 ]
 
@@ -196,8 +197,8 @@ def require_company(company: str, options: Mapping[str, object], *, is_given: ob
 
 
 VALUES_HELP: Final = (
-    "250,500,1000 or a range A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). Words that "
-    "the key takes, as optimal, may be among the values."
+    "250,500,1000 (with or without a unit, as 1ms) or a range A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT "
+    "(evenly, both ends). Words that the key takes, as optimal, may be among the values."
 )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from busplan.buses.limits import Value
 from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity
@@ -54,6 +54,13 @@ class Finding(NamedTuple):
     """Remedy, in words."""
     cure: str | None = None
     """Remedy as lines of TOML: key = value."""
+    weight: float = 0.0
+    """As of its `RuleProblem`."""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The finding in JSON and CSV."""
+        return {name: value for name, value in self._asdict().items() if name != "weight"}
 
 
 def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
@@ -79,7 +86,7 @@ def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> F
     cure = f"cheapest cure: {', '.join(problem.cure)}" if problem.cure else ""
     message = "; ".join(filter(None, (words, problem.help, cure)))
     mending = problem.help or None, "\n".join(problem.cure) or None
-    return Finding(rule.code, rule.name, rule.severity, message, problem.key, *spot, words, *mending)
+    return Finding(rule.code, rule.name, rule.severity, message, problem.key, *spot, words, *mending, problem.weight)
 
 
 class Subject:

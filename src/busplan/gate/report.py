@@ -57,7 +57,7 @@ class CheckReport(NamedTuple):
     unmatched: str = ""
     """Message on profiles without a record and records without a profile; empty where there are none."""
     lists_all: bool = False
-    """Whether people read every finding of a rule that is otherwise told once a run."""
+    """Whether people read every finding of a rule that is otherwise told once a file."""
 
     @property
     def summary(self) -> Summary:
@@ -90,15 +90,17 @@ class CheckReport(NamedTuple):
 
     @property
     def told(self) -> tuple[Located, ...]:
-        """Findings for people; for a rule that is told once a run, only the first."""
-        seen: set[str] = set()
-        told = []
-        for located in self.located:
-            code = located.finding.code
-            if self.lists_all or code not in _TOLD_ONCE or code not in seen:
-                told.append(located)
-            seen.add(code)
-        return tuple(told)
+        """Findings for people; for a rule that is told once a file, only the heaviest."""
+        if self.lists_all:
+            return self.located
+        heaviest: dict[tuple[str, str], Located] = {}
+        for located in sorted(self.located, key=lambda located: -located.finding.weight):
+            heaviest.setdefault((located.path, located.finding.code), located)
+        return tuple(
+            located
+            for located in self.located
+            if located.finding.code not in _TOLD_ONCE or located in heaviest.values()
+        )
 
 
 def _fingerprint(path: str, finding: Finding, number: str) -> str:
@@ -107,7 +109,7 @@ def _fingerprint(path: str, finding: Finding, number: str) -> str:
 
 
 _TOLD_ONCE: Final = ("BP112",)
-"""Rules with the same finding in every profile."""
+"""Rules of which text has one finding of each file."""
 
 
 def check_report(report: CheckReport) -> Report:
@@ -116,7 +118,7 @@ def check_report(report: CheckReport) -> Report:
         Sentence(("Check of profiles",)),
         tuple(_sentences(report)),
         check_document(report),
-        [{"path": located.path, **located.finding._asdict()} for located in report.located],
+        [{"path": located.path, **located.finding.record} for located in report.located],
     )
 
 
@@ -167,10 +169,8 @@ def check_document(report: CheckReport) -> JsonDocument:
             "profile": file.profile,
             "status": file.status,
             **_fit_record(file.fit or Fit()),
-            "findings": [finding._asdict() for finding in file.findings],
-            "suppressed": [
-                {**each.finding._asdict(), "by": each.by, "reason": each.reason} for each in file.suppressed
-            ],
+            "findings": [finding.record for finding in file.findings],
+            "suppressed": [{**each.finding.record, "by": each.by, "reason": each.reason} for each in file.suppressed],
         }
         files.append(content if file.failure is None else {**content, "failure": file.failure})
     return changed_document(document("check", files=files, summary=report.summary._asdict()), report.changes)

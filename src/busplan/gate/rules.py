@@ -121,7 +121,7 @@ def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
         noun = "an assumption" if len(assumption.keys) == 1 else "one of several assumptions"
         for key in assumption.keys:
             place = f"{key}.grade" if assumption.is_execution else key
-            yield RuleProblem(place, f"{noun}, which {assumption.carries}", "measure it")
+            yield RuleProblem(place, f"{noun}, which {assumption.carries}", "measure it", weight=assumption.share)
 
 
 CHECKS: Final[Mapping[str, Check]] = {

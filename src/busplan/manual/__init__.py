@@ -10,6 +10,8 @@ from typing import Final
 
 FOLDER: Final = Path(__file__).parent
 """Folder of the pages."""
+TOUR: Final = "commands"
+"""Topic to read first."""
 _HEADING: Final = "# "
 _TABLE: Final = re.compile(r"^> `busplan manual \w+` has a table here: ([a-z ]+?)(?: of `([\w-]+)`)?\.$", re.MULTILINE)
 """Place of a table in a page: what it has, and of which kind of bus or command."""
@@ -21,14 +23,15 @@ def topics() -> dict[str, str]:
     Returns
     -------
     dict
-        Heading of each page by topic (its file name), sorted by topic.
+        Heading of each page by topic (its file name): the tour of the commands, then the others by name.
 
     Examples
     --------
     >>> topics()["limits"]
     'Limits of validity'
     """
-    return {path.stem: _heading(path.stem) for path in sorted(FOLDER.glob("*.md"))}
+    names = sorted((path.stem for path in FOLDER.glob("*.md")), key=lambda name: (name != TOUR, name))
+    return {name: _heading(name) for name in names}
 
 
 def page(topic: str) -> str:

@@ -169,7 +169,7 @@ def _parsed(text: str) -> KeyChange:
     if not equals or not written or not _KEY.fullmatch(key):
         raise BusplanError(f"{SET} {text}: expected KEY=VALUE with a dotted key of the profile, as cycle.period_us=500")
     if with_unit := _WITH_UNIT.fullmatch(written):
-        unit = next((unit for unit in UNITS if key.endswith(f"_{unit}")), "")
+        unit = _unit_of(key)
         value = in_unit(with_unit["number"], with_unit["unit"], unit)
         if value is not None:
             return KeyChange(key, value, text=f"{key}={written}", note=f", in {unit} {value:g}")
@@ -178,6 +178,11 @@ def _parsed(text: str) -> KeyChange:
         # The schema reports what would be right: another key, or a number alone.
         return KeyChange(key, written, text=f"{key}={written}")
     return KeyChange(key, _value(written, name=f"{SET} {text}"), text=f"{key}={written}")
+
+
+def _unit_of(key: str) -> str:
+    """Unit at the end of a key; empty for one that takes none."""
+    return next((unit for unit in UNITS if key.endswith(f"_{unit}")), "")
 
 
 def in_unit(number: str, written: str, unit: str) -> float | None:
@@ -197,9 +202,27 @@ def in_unit(number: str, written: str, unit: str) -> float | None:
     return int(value) if value.is_integer() else value
 
 
+def without_units(values: str, *, key: str) -> str:
+    """Values of a key as typed, each number with a unit converted to that of the key.
+
+    A unit of another quantity stays.
+
+    Examples
+    --------
+    >>> without_units("0.25ms:1ms:50us", key="cycle.period_us"), without_units("S200,S400", key="bus.speed")
+    ('250:1000:50', 'S200,S400')
+    """
+
+    def converted(match: re.Match[str]) -> str:
+        value = in_unit(match["number"], match["unit"], _unit_of(key))
+        return match[0] if value is None else repr(value)
+
+    return re.sub(rf"(?<![^,:\s]){_WITH_UNIT.pattern}(?![^,:\s])", converted, values)
+
+
 def _value(written: str, *, name: str) -> object:
     """Parse a TOML value; a bare word is text."""
-    from busplan.profile.document import Document  # noqa: PLC0415 - as above
+    from busplan.profile.document import Document, number_meant  # noqa: PLC0415 - as above
 
     try:
         data = Document(SET, f"{_VALUE} = {written}").data()
@@ -209,6 +232,8 @@ def _value(written: str, *, name: str) -> object:
         return data[_VALUE]
     if _WORD.fullmatch(written):
         return written
+    if meant := number_meant(written):
+        raise BusplanError(f"{name}: {written} is not a TOML value{meant}")
     raise BusplanError(
         f"{name}: {written} is not a TOML value; expected a number with or without its unit, true or false, a word, "
         'text in quotes, as "two words", an array, as [4, 16], or a table, as {kind = "linear", base_us = 30}'

@@ -165,7 +165,20 @@ class Document:
         what = f"not valid TOML: {match['what'][:1].lower()}{match['what'][1:]}"
         if not match["line"]:
             return self.syntax_error(len(self.text), f"{what}, and the file ends")
-        return self.syntax_error(self.lines.offset(int(match["line"]), int(match["column"])), what)
+        line = self.text.split("\n")[int(match["line"]) - 1].partition("=")[2]
+        meant = number_meant(line.partition("#")[0].strip())
+        return self.syntax_error(self.lines.offset(int(match["line"]), int(match["column"])), f"{what}{meant}")
+
+
+def number_meant(written: str) -> str:
+    """What a number with a decimal comma or a percent sign is in TOML, after a semicolon; empty for other text."""
+    match = re.fullmatch(r"(-?[0-9]{1,20})(?:[.,]([0-9]{1,20}))?\s*(%?)", written)
+    if match is None or not (match[3] or "," in written):
+        return ""
+    number = f"{match[1]}.{match[2]}" if match[2] else match[1]
+    if match[3]:
+        return f"; a share is a number without a sign: {float(number) / 100:g}"
+    return f"; a number has a decimal point, not a comma: {number}"
 
 
 def _first_deep_bracket(text: str) -> int:

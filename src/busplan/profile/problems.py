@@ -1,7 +1,9 @@
 """Translation of pydantic's validation errors into problems of profile keys."""
 
+import re
 from collections.abc import Iterator
 from difflib import get_close_matches
+from math import inf
 from operator import eq
 from typing import Any, Final, NamedTuple, get_args
 
@@ -9,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from busplan.buses import kind_names
-from busplan.english import listed, printable
+from busplan.english import did_you_mean, listed, printable
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import Document
 from busplan.profile.edit import value_text
@@ -17,6 +19,9 @@ from busplan.profile.kinds import kind_of, kinds_with, models_of, named_path, pa
 from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
+_PERCENT: Final = 100
+_LEAST_PERCENT: Final = 2
+"""A share from here on is taken for a percentage."""
 _TAG: Final = "kind"
 """The key that selects the member of a union of tables."""
 _WRONG_TYPE: Final = {
@@ -123,7 +128,9 @@ def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
     """Problem of an unknown kind of bus, which the common model does not find."""
     bus = data.get("bus")
     if kind_of(data) is None and isinstance(bus, dict) and isinstance(bus.get("kind"), str):
-        yield KeyFinding(("bus", "kind"), f"expected {' or '.join(map(value_text, kind_names()))}", "out-of-range")
+        near = did_you_mean(bus["kind"], kind_names(), write=value_text)
+        expected = f"expected {listed([*map(value_text, kind_names())], 'or')}{near and f'; {near}'}"
+        yield KeyFinding(("bus", "kind"), expected, "out-of-range")
 
 
 def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyPath, type[BaseModel]]:
@@ -168,10 +175,22 @@ def _expected(details: ErrorDetails) -> str:
     if kind in _WRONG_TYPE:
         return f"expected {_WRONG_TYPE[kind]}"
     if kind == "literal_error":
-        return f"expected {context['expected']}".replace("'", '"')
+        expected, words = (
+            f"expected {context['expected']}".replace("'", '"'),
+            re.findall("'([^']*)'", context["expected"]),
+        )
+        near = did_you_mean(details["input"], words, write=value_text) if isinstance(details["input"], str) else ""
+        return f"{expected}{near and f'; {near}'}"
     if kind in _OUT_OF_RANGE:
-        return _OUT_OF_RANGE[kind].format(**context)
+        return f"{_OUT_OF_RANGE[kind].format(**context)}{_as_share(details['input'], context.get('le', inf))}"
     return details["msg"]
+
+
+def _as_share(value: Any, most: float) -> str:
+    """What a percentage is as a share, if one was given for it; else nothing."""
+    if most > 1 or not isinstance(value, int | float) or not _LEAST_PERCENT <= value <= _PERCENT * most:
+        return ""
+    return f"; it is a share: {value / _PERCENT:g} for {value:g} %"
 
 
 def _missing(path: KeyPath, section: type[BaseModel]) -> str:

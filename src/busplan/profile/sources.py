@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -54,6 +55,13 @@ def _unknown(argument: str, path: Path) -> str:
     if argument and os.path.lexists(with_ending):
         return f"{shown}: no such file; did you mean {argument}.toml?"
     near = did_you_mean(argument, shipped_names())
+    if not near and argument:
+        beside: list[str] = []
+        with suppress(OSError, ValueError):  # no such folder; a NUL in the path
+            beside = sorted(file.stem for file in path.parent.glob("*.toml"))
+        files = did_you_mean(path.stem, beside, write=lambda stem: f"{path.with_name(stem)}.toml")
+        if files:
+            return f"{shown}: no such file; {files}"
     names = ", ".join(shipped_names())
     return f"{shown}: no such file, and no shipped profile of that name; shipped are {names}{near and f'; {near}'}"
 

@@ -45,7 +45,7 @@ reserve = 0.15             # share of the slice that must stay free for the cycl
 grade = "assumed"
 loop = "node"              # assumed: where the position loop is closed; "host" needs servo.update
 interpolation = "linear"   # assumed: what a node does between set-points
-{step}# assumed: period of the position loop; it divides cycle.period_us
+{step}# assumed: longest period of the position loop; one that divides cycle.period_us is taken
 position_gain_per_s = 50   # assumed: the Kv factor of the drives, 1/s; 1 m/min per mm is 16.7
 velocity_feedforward = 1   # assumed
 drive_lag_us = 1000        # assumed: time constant of the velocity loop, from its step response

@@ -119,8 +119,9 @@ class Profile(Section):
         """
         for key in OF_ALIKE_NODES:
             if "group" in given and key in given:
-                where = ", as group.NAME.nodes" if key == "bus.nodes" else ""
-                yield Problem(f"each [[group]] has its own{where}; remove one of the two", key=key, kind="inconsistent")
+                right = "this profile has groups; set group.NAME.nodes instead"
+                why = right if key == "bus.nodes" else "each [[group]] has its own; remove one of the two"
+                yield Problem(why, key=key, kind="inconsistent")
             elif "group" not in given and key not in given:
                 yield Problem(MISSING, key=key, kind="missing-key")
 

@@ -99,7 +99,7 @@ def require_cycle(profile: Profile, *, question: str, instead: str = "") -> Prof
     """
     if profile.has_cycle:
         return profile
-    advice = instead or "capacity, latency, check, plan, sweep and diff judge messages"
+    advice = instead or "capacity, latency, check, plan, sweep, map and diff judge messages"
     raise BusplanError(f"{profile.name}: a network of messages alone has no cycle, which {question} needs; {advice}")
 
 

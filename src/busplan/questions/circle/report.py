@@ -106,8 +106,9 @@ def _attack(result: CircleFigures) -> Iterator[Sentence]:
     label = CIRCLE_BY_KEY[measure].label
     if attack is not None:
         source, removed_mm = attack
+        what = "Shorten the period" if source.source == "period" else f"Attack {source.words}"
         yield sentence(
-            f"Attack {source.words} first: without it the {label} is {{}}, {{}} less.",
+            f"{what} first: without it the {label} is {{}}, {{}} less.",
             attribute_value(CIRCLE_BY_KEY[measure], source),
             ShownValue(removed_mm, "removed_mm", "um", 3),
         )

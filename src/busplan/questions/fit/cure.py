@@ -463,12 +463,12 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
     if profile.group:
         now = {group: int(group.nodes) * int(group.node.axes) for group in profile.node_groups}
         needed = {group: axes - sum(now.values()) + now[group] for group in now if group.node.axes}
-        ways = ", or ".join(
-            f"set {group.nodes_key}={ceil(of_group / int(group.node.axes))}"
+        ways = " or ".join(
+            f"--set {group.nodes_key}={ceil(of_group / int(group.node.axes))}"
             for group, of_group in needed.items()
             if of_group > 0
         )
-        instead = f"instead {ways}" if ways else "set the nodes of a group instead"
+        instead = f"say {ways}" if ways else "set the nodes of a group instead"
         raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
     (group,) = profile.node_groups
     return ceil(axes / int(group.node.axes))

@@ -154,6 +154,8 @@ class HeavyAssumption(NamedTuple):
     """Dotted keys: one, or the section of each group's execution time, as these err together."""
     carries: str
     """The shares in words, beginning with the verb."""
+    share: float
+    """The largest share."""
 
     @property
     def is_execution(self) -> bool:
@@ -185,12 +187,18 @@ def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssu
     shares = [share for share in shares if share[1] > _HEAVY_SHARE and _is_assumed(profile, share[0][0])]
     shares += _execution_shares(figures, network, variance)
     shares += _rate_shares(figures, network)
-    carried: dict[tuple[str, ...], list[str]] = {}
+    carried: dict[tuple[str, ...], list[tuple[str, float]]] = {}
     for keys, share, whole in shares:
         if share > _HEAVY_SHARE:
-            carried.setdefault(keys, []).append(f"{share:.0%} of {whole}")
-    verbs = {keys: "carries" if len(keys) == 1 else "together carry" for keys in carried}
-    return tuple(HeavyAssumption(keys, f"{verbs[keys]} {' and '.join(words)}") for keys, words in carried.items())
+            carried.setdefault(keys, []).append((f"{share:.0%} of {whole}", share))
+    return tuple(
+        HeavyAssumption(
+            keys,
+            f"{'carries' if len(keys) == 1 else 'together carry'} {' and '.join(words for words, _ in parts)}",
+            max(share for _, share in parts),
+        )
+        for keys, parts in carried.items()
+    )
 
 
 def _is_assumed(profile: Profile, key: str) -> bool:

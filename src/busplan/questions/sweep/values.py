@@ -13,6 +13,7 @@ from busplan.buses.limits import Value
 from busplan.buses.network import Network
 from busplan.english import listed
 from busplan.errors import BusplanError
+from busplan.profile.changes import without_units
 from busplan.profile.document import override
 from busplan.profile.edit import whole
 from busplan.profile.kinds import cycle_keys, dotted_keys, words_of
@@ -193,7 +194,7 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
     """
     words = words_of(profile, key)
     if isinstance(given, str):
-        return _parsed(given, name=f"{name} {key}={given}", words=words)
+        return _parsed(without_units(given, key=key), name=f"{name} {key}={given}", words=words)
     if isinstance(given, range) and given[MOST_POINTS:]:
         raise BusplanError(f"{name} {key}: more values than the {MOST_POINTS:,} points a sweep takes; vary less")
     return _listed(items(given, name=f"{name} {key}"), name=f"{name} {key}", words=words)
