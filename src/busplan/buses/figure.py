@@ -159,10 +159,10 @@ REQUIRED_TIME_SLICE: Final = Figure(
     "required_time_slice_us", "T_cs,needed", _SLICE, "time slice that each node needs", "time slice T_cs, needed"
 )
 BINDING_TERM: Final = Figure(
-    "binding_term", "binding term", _SLICE, "the largest part of what the cycle needs", "largest term", sort="word"
+    "binding_term", "binding term", _SLICE, "largest term of the required time", "largest term", sort="word"
 )
 UTILISATION: Final = Figure(
-    "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"
+    "utilisation", "rho", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"
 )
 MARGIN: Final = Figure(
     "margin_us", "margin", _CYCLE, "what is left of the slice", "margin", better="more", scale="available_us"

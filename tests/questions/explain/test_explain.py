@@ -286,7 +286,7 @@ def test_a_figure_is_found_by_what_it_is_called(
         ("can-servo-8", "sdo", "did you mean sdo-request or sdo-response?"),
         ("can-servo-8", "heart", "did you mean heartbeats?"),
         ("gantry-24", "drive", "did you mean drives"),
-        ("paper-1ms", "", "'': no such figure; without one, explain lists them"),
+        ("paper-1ms", "", "'': no such figure; without one, explain --all lists them"),
         ("paper-1ms", "circle-test.required_us", "no such figure"),
         ("paper-1ms", "(99)", "no such figure"),
         # Searches, comparisons and words have no equation.

@@ -83,6 +83,6 @@ def test_rows_have_equal_steps_or_say_that_they_do_not(periods_us: list[int], la
     answer = busplan.map_("paper-4ms", x={"axes": [4, 8]}, y={"cycle.period_us": periods_us})
     grid = grid_of(answer)
     assert (grid.up.label, grid.across.label) == (label, "axes (bus.nodes)")
-    assert ("period against axes (bus.nodes), in unequal steps" in str(answer)) == ("unequal" in label)
+    assert ("Period against axes (bus.nodes); steps are unequal" in str(answer)) == ("unequal" in label)
     words = grid_of(mapped("words"))
     assert (words.up.label, words.across.label) == ("bus.speed", "bus.gap_count")
