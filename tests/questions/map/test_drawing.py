@@ -60,7 +60,7 @@ def test_the_legend_explains_every_mark_once_and_this_design(name: str) -> None:
 
 def test_limits_where_no_period_helps_have_letters() -> None:
     entries = {entry.mark: entry.words for entry in grid_of(mapped("crowded")).legend}
-    assert entries == {"#": "fits", "h": "does not fit: hops", "n": "does not fit: nodes and hops", "": "this design"}
+    assert entries == {"#": "fits", "h": "does not fit: hops", "b": "does not fit: nodes and hops", "": "this design"}
 
 
 def test_this_design_is_framed_and_marked_in_characters() -> None:
