@@ -167,7 +167,7 @@ def test_the_papers_equations_are_said_to_disagree_and_decide_nothing(run: Run) 
     done = run("capacity", "paper-4ms", "--period", "500us")
     assert done.returncode == 0
     assert "  short by        20 us, +/- 6\n" in done.stdout
-    assert "  paper model     says otherwise: needs 207 us of 250; it does not decide\n" in done.stdout
+    assert "  paper model     fits: 207 us of 250; the standard model decides\n" in done.stdout
     assert not any(verdict["models_agree"] for verdict in verdicts(run, "paper-4ms", "--period", "500us"))
 
 

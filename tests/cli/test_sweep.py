@@ -35,7 +35,7 @@ def test_the_first_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) 
         assert (shown.returncode, shown.stderr) == (0, "")
         run = busplan("sweep", "paper-4ms", *grid, "-o", name, cwd=tmp_path)
         assert (run.returncode, run.stdout) == (0, "")
-        fits = "13 shown to fit (standard model), 16 fit by the closed form of the paper model."
+        fits = "13 shown to fit (standard model), 16 fit by the paper model."
         assert run.stderr == f"paper-4ms: 16 points; {fits}\nwrote {name}\n"
         assert (tmp_path / name).read_text(encoding="utf-8") == shown.stdout
     rows = [line for line in (tmp_path / "rows.md").read_text(encoding="utf-8").splitlines() if line.startswith("| ")]

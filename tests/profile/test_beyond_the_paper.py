@@ -49,7 +49,7 @@ def test_such_a_key_leaves_the_standard_alone_and_a_sentence_says_why(busplan: R
     assert done.returncode == 0, done.stderr
     assert f"  paper model     not applicable: it has no {key}\n" in done.stdout
     (header,) = [line for line in done.stdout.splitlines() if line.startswith("figure ")]
-    assert header.split() == ["figure", "eq", "unit", "standard"]
+    assert header.split() == ["figure", "source", "unit", "standard"]
     document = json.loads(busplan("capacity", "own.toml", "--format", "json", cwd=own.parent).stdout)
     assert [one["timing_model"] for one in document["results"]] == ["standard"]
 

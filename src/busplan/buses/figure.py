@@ -162,7 +162,7 @@ BINDING_TERM: Final = Figure(
     "binding_term", "binding term", _SLICE, "largest term of the required time", "largest term", sort="word"
 )
 UTILISATION: Final = Figure(
-    "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"
+    "utilisation", "rho", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"
 )
 MARGIN: Final = Figure(
     "margin_us", "margin", _CYCLE, "unused time of the slice", "margin", better="more", scale="available_us"

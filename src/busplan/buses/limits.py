@@ -77,7 +77,7 @@ class EventKind(NamedTuple):
     ink: Ink
 
 
-IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
+IDLE: Final = EventKind("idle", "idle", MARGIN.reference, ".", "idle")
 """Rest of the slice."""
 
 

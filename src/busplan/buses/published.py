@@ -58,13 +58,17 @@ class Tested(NamedTuple):
     """Parts that no figure tests."""
 
 
-def parts_tested(names: Sequence[str]) -> Tested:
-    """Parts that data files set and test, by their tables [set_by] and [tested], and parts that they do not test."""
+def parts_tested(names: Sequence[str], *, of_kind: bool = False) -> Tested:
+    """Parts that data files set and test, by their tables [set_by] and [tested], and parts that they do not test.
+
+    Those of a whole kind of bus have the key `untested_elsewhere`, too: what is not tested of other protocols.
+    """
 
     def parts(table: str) -> dict[str, str]:
         return {part: _words(name, part, row) for name in names for part, row in data_file(name).get(table, {}).items()}
 
-    untested = (part for name in names for part in data_file(name).get("untested", ()))
+    keys = ("untested_elsewhere", "untested") if of_kind else ("untested",)
+    untested = (part for name in names for key in keys for part in data_file(name).get(key, ()))
     return Tested(parts("set_by"), parts("tested"), tuple(untested))
 
 

@@ -98,9 +98,11 @@ def _spare(counts: Any, spare: int, least: int) -> str:
 
 
 def _room(subject: RuleSubject, counts: Any) -> Mending:
-    """Way to make room for more nodes."""
-    limit = subject.network.bus.limit(counts.safe_limited_by)
-    return subject.cure() if limit is None or limit.role == "safety" else Mending(limit.advice(subject.network))
+    """Way to make room for more nodes: the cure, or where there is none what the limit advises."""
+    limit, cure = subject.network.bus.limit(counts.safe_limited_by), subject.cure()
+    if cure.cure or limit is None or limit.role == "safety":
+        return cure
+    return Mending(limit.advice(subject.network))
 
 
 def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:

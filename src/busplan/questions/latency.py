@@ -18,11 +18,13 @@ from busplan.forms.blocks import (
     Record,
     Report,
     Sentence,
+    ShownValue,
     State,
     Table,
     TableColumn,
     TableRow,
     attribute_value,
+    sentence,
 )
 from busplan.forms.numbers import known_text
 from busplan.questions.base.answer import Answer
@@ -221,10 +223,22 @@ def _records(transactions: Sequence[Transaction]) -> list[Record]:
 
 
 def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
-    """Phases of each transaction, the timing models side by side; one table for each payload."""
+    """The loop over the host in a sentence, and the phases of each transaction; one table for each payload."""
+    register = answer.deciding[0].bus_figures
+    # Of one payload and of nodes that are alike.
+    decided = [row for row in answer.transactions if row.timing_model == answer.deciding[0].timing_model]
+    phases = {row.transaction: row.phases for row in decided}
+    loop = phases.get("loop") if len(phases) == len(decided) else None
     yield from answer.deadlines
+    if loop and not register.deadlines:
+        whole = register.latency_table[-1].key
+        times = (ShownValue(phases[name][whole], whole, "us", 0) for name in ("command", "feedback", "loop"))
+        yield sentence("A command acts after {}, feedback is {} old, a loop takes {}.", *times)
     yield from _tables(answer)
-    yield Sentence((Code(answer.profile.name), f": {answer.subject}."))
+    if loop and register.deadlines and loop[register.deadlines[0]] is not None:
+        times = [ShownValue(loop[key], key, "us", 0) for key in (register.deadlines[0], "pipeline_us") if loop[key]]
+        of_host = ", of which {} are the host's cycles" if len(times) > 1 else ""
+        yield sentence(f"Loop: {{}} from SYNC to the executed command{of_host}.", *times)
     yield from answer.notes
 
 

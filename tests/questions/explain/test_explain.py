@@ -286,7 +286,7 @@ def test_a_figure_is_found_by_what_it_is_called(
         ("can-servo-8", "sdo", "did you mean sdo-request or sdo-response?"),
         ("can-servo-8", "heart", "did you mean heartbeats?"),
         ("gantry-24", "drive", "did you mean drives"),
-        ("paper-1ms", "", "'': no such figure; without one, explain lists them"),
+        ("paper-1ms", "", "'': no such figure; without one, explain --all lists them"),
         ("paper-1ms", "circle-test.required_us", "no such figure"),
         ("paper-1ms", "(99)", "no such figure"),
         # Searches, comparisons and words have no equation.
@@ -348,3 +348,19 @@ def test_no_line_is_longer_than_the_terminal(width: int) -> None:
         for figure in (None, "margin_corrected_us", "uncertainty_us"):
             lines = terminal.text(busplan.explain(name, figure).report(), width=width).splitlines()
             assert max(map(len, lines)) <= width, figure
+
+
+def test_the_lines_of_the_card_are_names_and_the_margin_names_the_one_that_decides() -> None:
+    def keys(name: str) -> list[str]:
+        return [found.figure.key for found in busplan.explain("gantry-24", name).derivations]
+
+    assert keys("used") == ["required_us", "bias_us"]
+    assert keys("free") == ["margin_corrected_us", "uncertainty_us"]
+    assert keys("fastest period") == ["safe_min_period_us"]
+    assert "The verdict uses margin_corrected_us, 932.012 us." in str(busplan.explain("gantry-24", "margin"))
+    # 1700 us less the time that is used.
+    required, bias, corrected = (
+        busplan.explain("gantry-24", name).derivations[0].value
+        for name in ("required_us", "bias_us", "margin_corrected_us")
+    )
+    assert 1700 - required - bias == pytest.approx(corrected)

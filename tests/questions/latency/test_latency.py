@@ -45,3 +45,11 @@ def test_a_payload_outside_the_table_is_refused_with_its_range(make: Make) -> No
     table = {"kind": "table", "payload_bytes": [4, 64], "time_us": [30.0, 50.0]}
     with pytest.raises(BusplanError, match="payload 65 bytes: outside the execution table of test, 4 to 64 bytes"):
         busplan.latency(make(node__execution=table), payload_bytes=[65])
+
+
+def test_a_loop_over_the_host_is_said_in_a_sentence() -> None:
+    first, *_ = str(busplan.latency("ethercat-servo-8")).splitlines()
+    assert first == "A command acts after 1500 us, feedback is 604 us old, a loop takes 2000 us."
+    said = "Loop: 8520 us from SYNC to the executed command, of which 5000 us are the host's cycles."
+    assert said in str(busplan.latency("canopen-6")).splitlines()
+    assert "oop" not in str(busplan.latency("ethercat-servo-8", timing_model="vendors")).splitlines()[0]

@@ -60,7 +60,7 @@ def test_the_legend_explains_every_mark_once_and_this_design(name: str) -> None:
 
 def test_limits_where_no_period_helps_have_letters() -> None:
     entries = {entry.mark: entry.words for entry in grid_of(mapped("crowded")).legend}
-    assert entries == {"#": "fits", "h": "does not fit: hops", "n": "does not fit: nodes and hops", "": "this design"}
+    assert entries == {"#": "fits", "h": "does not fit: hops", "b": "does not fit: nodes and hops", "": "this design"}
 
 
 def test_this_design_is_framed_and_marked_in_characters() -> None:
@@ -83,6 +83,6 @@ def test_rows_have_equal_steps_or_say_that_they_do_not(periods_us: list[int], la
     answer = busplan.map_("paper-4ms", x={"axes": [4, 8]}, y={"cycle.period_us": periods_us})
     grid = grid_of(answer)
     assert (grid.up.label, grid.across.label) == (label, "axes (bus.nodes)")
-    assert ("period against axes (bus.nodes), in unequal steps" in str(answer)) == ("unequal" in label)
+    assert ("Period against axes (bus.nodes); steps are unequal" in str(answer)) == ("unequal" in label)
     words = grid_of(mapped("words"))
     assert (words.up.label, words.across.label) == ("bus.speed", "bus.gap_count")

@@ -252,3 +252,21 @@ def test_every_pair_of_freedoms_gives_what_each_gives_alone(make: Make) -> None:
         alone = changes_of(profile, [first])
         if alone is not None:
             assert changes_of(profile, [first, second]) == alone
+
+
+def test_a_row_that_changes_nothing_is_a_word_below_the_table() -> None:
+    lines = str(busplan.plan("can-servo-8", nodes=30)).splitlines()
+    rows = [line for line in lines if " deadline " in line]
+    assert [row.split()[:3] for row in rows] == [["as", "it", "is"]]
+    assert "-4890 +/- 350" in rows[0]
+    assert "No help: slice ratio, bit rate, length of identifiers, period." in lines
+
+
+def test_what_was_asked_for_is_named_where_nothing_else_changes() -> None:
+    said = str(busplan.plan("paper-4ms", nodes=3)).splitlines()[0]
+    assert "(12 axes) at 4 ms: bus.nodes = 3 is all that changes; it fits with a corrected margin of " in said
+
+
+def test_a_change_of_a_group_has_the_meaning_of_the_key() -> None:
+    said = str(busplan.plan("gantry-24", period_us=800.0)).splitlines()[0]
+    assert 'group.drives.read_response = "concatenated" (if the nodes can)' in said

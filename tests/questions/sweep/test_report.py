@@ -50,7 +50,7 @@ def test_the_summary_counts_points_under_each_model(answer: busplan.SweepAnswer,
     paper, standard = ([row for row in rows if row["timing_model"] == model] for model in ("paper", "standard"))
     by_hand = sum(row["fits"] for row in paper), sum(row["verdict"] == "fits" for row in standard)
     assert by_hand[1] <= sum(row["fits"] for row in standard) < by_hand[0] < 18
-    fitting = f"{by_hand[1]} shown to fit (standard model), {by_hand[0]} fit by the closed form of the paper model."
+    fitting = f"{by_hand[1]} shown to fit (standard model), {by_hand[0]} fit by the paper model."
     assert sentences_of(answer)[0] == f"paper-4ms: 18 points; {fitting}"
     assert (len(sentences_of(answer)) == 2) == any(not row["gap_count_safe"] for row in standard)
     # The whole grid's number is in the document.

@@ -79,7 +79,7 @@ def test_a_drawing_is_to_scale() -> None:
     one = plan(bus__nodes=8)
     lines = drawn(one, 132)
     strip = row(lines, "cycle")
-    for mark, kinds in {"R": "read", "W": "write", "~": None}.items():
+    for mark, kinds in {"R": "read", "W": "write", ".": None}.items():
         part_us = sum(part.duration_us for part in one.events if part.transaction == kinds and part.kind != "sync")
         assert strip.count(mark) == pytest.approx(part_us / 4000 * len(strip), abs=1.01)
     assert strip.count("-") == pytest.approx(len(strip) / 2, abs=1.01)

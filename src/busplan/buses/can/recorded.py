@@ -297,7 +297,8 @@ class _Log:
             quantity = "SYNC: jitter of the arrival"
             key = "bus.sync_jitter_us"
             jitter = RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count, key)
-            yield jitter
+            of_host = f"{key}, " if self.traffic.sync_jitter_us else ""
+            yield jitter._replace(note=f"planned: {of_host}the wait for other frames and stuff bits")
             if jitter.verdict == "outside":
                 # All of it may be the host's: what other frames add is not known of any one SYNC.
                 self.edits[key] = ceil(10 * late.value) / 10

@@ -56,7 +56,7 @@ EVENTS: Final = (
     _kind("execution", "execution", "execution_us", "=", "work"),
     _kind("worst_extra", "slowest execution", "worst_extra_us", "x", "work"),
     _kind("response_data", "response data", "response_data_us", "<", "response"),
-    _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
+    _kind("subaction_gap", "subaction gap", "subaction_gap_us", ",", "gap"),
     _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
     EventKind("node_wait", "wait of a node", "broadcast", "w", "gap"),
     EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),

@@ -64,7 +64,7 @@ FIGURES: Final = BusFigures(TERMS, setup=(RATE,), headings=(RATE.key,))
 EVENTS: Final = (
     EventKind("once", "token and GAP", _WIRE, "t", "sync"),
     EventKind("global", "global control", _WIRE, "s", "sync"),
-    EventKind("gap", "idle time", _WIRE, ".", "gap"),
+    EventKind("gap", "idle time", _WIRE, ",", "gap"),
     EventKind("request", "request", _WIRE, ">", "out"),
     EventKind("turn", "turn-around", _WIRE, "=", "work"),
     EventKind("answer", "answer", _WIRE, "<", "in"),

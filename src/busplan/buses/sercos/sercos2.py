@@ -108,7 +108,7 @@ EVENTS: Final = (
     EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
     EventKind("wait", "wait for drives", "profile", "=", "work"),
     EventKind("at", "AT of a drive", _TELEGRAMS, "<", "in"),
-    EventKind("gap", "gap between two drives", "profile", ".", "gap"),
+    EventKind("gap", "gap between two drives", "profile", ",", "gap"),
     EventKind("record", "record of a drive", _TELEGRAMS, ">", "out"),
     EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),

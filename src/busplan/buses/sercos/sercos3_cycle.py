@@ -38,7 +38,7 @@ EVENTS: Final = (
     EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
     EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
     EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
-    EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
+    EventKind("gap", "gap and padding", _COSEMA, ",", "gap"),
     EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
     EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
     EventKind("master", "master", _COSEMA, "=", "work"),

@@ -51,8 +51,13 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
         shown = ShownValue(value, key)
         return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
 
-    notes = {key: f" ({meaning})" for key, meaning in meanings.items()}
-    settings = (Sentence((f"{key} = ", *written(key, value), notes.get(key, ""))) for key, value in changes.items())
+    def note(key: str) -> str:
+        section, _, rest = key.partition(".")
+        # A key of a group of nodes means what that of alike nodes does.
+        of_node = f"node.{rest.partition('.')[2]}" if section == "group" else key
+        return f" ({meanings[of_node]})" if of_node in meanings else ""
+
+    settings = (Sentence((f"{key} = ", *written(key, value), note(key))) for key, value in changes.items())
     return joined(*settings, by=", ")
 
 
@@ -138,9 +143,12 @@ def time_lines(figures: FitFigures, profile: Profile) -> Iterator[tuple[str, Sen
     yield "used", Sentence((words,))
     doubt = "" if uncertainty_us is None else f", +/- {known_text(uncertainty_us, uncertainty_us)}"
     reserve_us = given_us * profile.limits.reserve
-    reserve = f"; {known_text(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
+    reserve = known_text(reserve_us, uncertainty_us) if reserve_us else ""
     free = f"{known_text(abs(margin_us), uncertainty_us)} us{doubt}"
-    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{free}{reserve}",))
+    if margin_us < 0:
+        yield "short by", Sentence((f"{free}{reserve and f', and {reserve} of reserve'}",))
+    else:
+        yield "free", Sentence((f"{free}{reserve and f'; {reserve} must stay free'}",))
 
 
 def used_us(figures: FitFigures) -> float:
@@ -211,7 +219,7 @@ def changes_sentences(changes: KeyChanges) -> list[Sentence]:
 
 
 _DROPPED_FIRST: Final = 9
-"""Rank of the column of equations: a narrow terminal drops it before the figures."""
+"""Rank of the column of sources: a narrow terminal drops it before the figures."""
 
 
 class FigureColumn(NamedTuple):
@@ -238,7 +246,7 @@ def figure_table(
     column of equations and sources is shown only with `--all` if `hides_equations`, and so is the row of a figure for
     which `is_detail` is true. `state` gives the state of a figure in its column; "neutral" keeps that of the value.
     """
-    equation = TableColumn("eq", kind="words", rank=_DROPPED_FIRST, is_detail=hides_equations)
+    equation = TableColumn("source", kind="words", rank=_DROPPED_FIRST, is_detail=hides_equations)
     head = [TableColumn("figure", kind="words"), equation]
     if unit:
         head.append(TableColumn("unit", kind="words"))

@@ -111,7 +111,7 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     if (drawn := _drawing(sensitivity)) is not None:
         change = _capital(effects[0].change)
         sides = "a bar to the left takes from it, one to the right adds to it"
-        yield Chart(drawn, Sentence((f"{change} moves the margin most; {sides}, in us",)))
+        yield Chart(drawn, Sentence((f"{change} moves the corrected margin most; {sides}, in us",)))
     yield _headline(sensitivity)
     if notes := tuple(Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note):
         yield Detail(notes, "why some changes have no effect")
@@ -123,15 +123,15 @@ def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
 def _table(sensitivity: Sensitivity) -> Table:
     """Every change with what it does to the margin, the largest effect first."""
     caption = sentence(
-        f"What moves the margin of {{}} at {{}}, by the {sensitivity.now.timing_model} model",
+        f"What moves the corrected margin of {{}} at {{}}, by the {sensitivity.now.timing_model} model",
         margin_parts(sensitivity.now)[0],
         period_value(sensitivity.now.period_us),
     )
     columns = (
         TableColumn("what changes", kind="words"),
         TableColumn("from -> to", kind="words", rank=1),
-        TableColumn("change", "us", group="margin"),
-        TableColumn("then", "us", group="margin"),
+        TableColumn("change", "us", group="corrected margin"),
+        TableColumn("then", "us", group="corrected margin"),
         TableColumn("verdict then", kind="words", wraps=True),
     )
     rows = (
@@ -223,14 +223,14 @@ def _drawing(sensitivity: Sensitivity) -> Drawing | None:
     )
     guides = [Guide(Entry("zero"), x=0.0)]
     if least <= -left_us < 0:
-        guides.append(Guide(Entry("edge", "nothing is left of the margin", shape="line"), x=-left_us))
+        guides.append(Guide(Entry("edge", "nothing is left of the corrected margin", shape="line"), x=-left_us))
     title = "What each small change does to the corrected margin"
     return Drawing(title, (Panel(Lanes(numbers("us", least, most), lanes, tuple(guides))),))
 
 
 def _bar(us: float) -> Iterator[Span]:
     if us < 0:
-        yield Span(Entry("takes", "takes from the margin"), us, 0.0)
+        yield Span(Entry("takes", "takes from the corrected margin"), us, 0.0)
     elif us > 0:
         yield Span(Entry("hides", "adds to it"), 0.0, us)
 
@@ -239,9 +239,9 @@ def _headline(sensitivity: Sensitivity) -> Sentence:
     """Say which change moves the margin most, and after which ones the cycle no longer fits or the bus is unsafe."""
     first = sensitivity.effects[0]
     if not first.margin_change_us:
-        return Sentence(("None of these changes moves the margin.",))
+        return Sentence(("None of these changes moves the corrected margin.",))
     most = sentence(
-        f"{_capital(first.change)} moves the margin most, by {{}} to {{}}.",
+        f"{_capital(first.change)} moves the corrected margin most, by {{}} to {{}}.",
         _change_value(first, sensitivity),
         _then_value(first),
     )
@@ -273,9 +273,7 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> Se
     if bottleneck.next_margin_corrected_us is not None:
         margin_us = bottleneck.next_margin_corrected_us
         margin = ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))
-        text = (
-            f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, and the margin {{}}"
-        )
+        text = f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, and the corrected margin {{}}"
         of_term = sentence(text, us, next_us, margin)
     else:
         then = f"the next term is {next_label}, {{}}"

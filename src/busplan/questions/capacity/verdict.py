@@ -401,31 +401,42 @@ def _buses(verdict: Verdict, bus: Bus) -> Iterator[_Line]:
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
         yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
-    elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups:
+    elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups and not verdict.change:
         limit = _limit_label(bus, figures.safe_limited_by)
         yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
 
 
 def _basis(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
-    """The largest part and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
+    """The largest term and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
     figures = verdict.deciding
     if figures.terms:
         largest = max(figures.terms, key=lambda term: term.us)
         us = known_text(largest.us, figures.uncertainty_us)
-        yield "largest part", Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
+        yield "largest term", Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
         part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
         yield "largest doubt", Sentence((f"{parts[0]['label']}, +/- {known_text(part_us, figures.uncertainty_us)} us",))
     if network.groups and figures.uncertainty_us is None:
         yield "doubt", Sentence(("not known",), "warns")
-    for assumption in verdict.assumptions:
-        them = "it" if len(assumption.keys) == 1 else "them"
-        yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
+    if verdict.assumptions:
+        yield "assumed", Sentence((_assumed_words(verdict.assumptions),), "warns")
     if verdict.rests_on:
         yield "rests on", Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
     if network.groups and (never := never_measured(tested)):
         yield "never measured", Sentence((never,))
+
+
+def _assumed_words(assumptions: Sequence[HeavyAssumption]) -> str:
+    """What carries the verdict and is assumed, and how to find it."""
+    rates = [key for assumption in assumptions for key in assumption.keys if assumption.is_bit_rate]
+    others = [key for assumption in assumptions for key in assumption.keys if key not in rates]
+    them = "it" if len(others) == 1 else "them"
+    words = (
+        f"{listed(others, 'and')}: measure {them} first" if others else "",
+        f"{listed(rates, 'and')}: look it up in the configuration of the nodes" if rates else "",
+    )
+    return "; ".join(filter(None, words))
 
 
 def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
@@ -448,10 +459,10 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
     for other in verdict.others:
         if contradicts(other.fits, deciding):
             needed_us = known_text(other.required_us, deciding.uncertainty_us)
-            words = (
-                f"says otherwise: needs {needed_us} us of {known_text(other.available_us, None)}; it does not decide"
-            )
-            yield f"{other.timing_model} model", Sentence((words,), "warns")
+            fits = "fits" if other.fits else "does not fit"
+            words = f"{fits}: {needed_us} us of {known_text(other.available_us, None)}"
+            decides = f"; the {deciding.timing_model} model decides"
+            yield f"{other.timing_model} model", Sentence((f"{words}{decides}",), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in verdict.after_reset.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")

@@ -52,8 +52,10 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
         yield Sentence((*subject, ": ", verdict, ", ", *_failure_words(result).parts, "."), verdict.state)
         yield from _attack(result)
         return
-    if result.passed:
-        yield Sentence((*subject, ": ", Words("the circle holds every tolerance", verdict.state), "."), verdict.state)
+    if profile.tolerance.judged:
+        holds = Words("the circle holds", verdict.state)
+        measures = joined(*_held(profile, result), by=", ").parts
+        yield Sentence((*subject, ": ", holds, ", ", *measures, f"{_but(profile, result)}."), verdict.state)
     elif result.sources_matter is False:
         none = Words("no error source of this profile matters", verdict.state)
         labels = [CIRCLE_BY_KEY[key].label for key in telling_measures(profile)]
@@ -75,8 +77,34 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
     )
 
 
+def _held(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
+    """Each measure with a tolerance, and that tolerance."""
+    for key in profile.tolerance.judged:
+        measure = CIRCLE_BY_KEY[key]
+        most = ShownValue(getattr(profile.tolerance, key), key, "um")
+        yield sentence(f"{measure.label} {{}} of {{}}", attribute_value(measure, result), most)
+
+
+def _but(profile: Profile, result: CircleFigures) -> str:
+    """Why a held tolerance says little of a machine; empty where an error of its mechanics matters."""
+    absent = _absent(profile)
+    if {*_MECHANICS} <= {*absent}:
+        return f"; but {listed(absent, 'and')} are 0 in this profile, so it says little"
+    return "; but no error source of this profile matters, so it says little" if result.sources_matter is False else ""
+
+
+_MECHANICS: Final = ("friction at reversals", "backlash", "squareness")
+"""Error sources of the mechanics in words."""
+
+
 def _are_zero(profile: Profile) -> str:
     """Usual error sources of a machine that a profile does not have, in words; empty if it has all."""
+    absent = _absent(profile)
+    return f": {listed(absent, 'and')} {'is' if len(absent) == 1 else 'are'} 0" if absent else ""
+
+
+def _absent(profile: Profile) -> list[str]:
+    """Usual error sources of a machine that a profile does not have."""
     servo, mechanics, delivery = profile.servo, profile.mechanics, profile.delivery
     axes = (servo, servo.x, servo.y)
     usual = {
@@ -86,8 +114,7 @@ def _are_zero(profile: Profile) -> str:
         "squareness": mechanics.squareness_um_per_m,
         "jitter": delivery.jitter_us,
     }
-    absent = [name for name, value in usual.items() if not value]
-    return f": {listed(absent, 'and')} {'is' if len(absent) == 1 else 'are'} 0" if absent else ""
+    return [name for name, value in usual.items() if not value]
 
 
 def _unjudged(profile: Profile, result: CircleFigures) -> tuple[Part, ...]:

@@ -243,7 +243,7 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     except BusplanError as error:
         bus = kind_named(kind)
         title = variant.replace("-", " ").upper() or bus.title
-        return NotOnKind(name, kind, title, parts_tested(bus.evidence_data), error.problems)
+        return NotOnKind(name, kind, title, parts_tested(bus.evidence_data, of_kind=True), error.problems)
     on_kind, assumed = network_of(conversion.profile), conversion.assumed
     is_own = kind == network.bus.kind and not variant
     needed = {} if is_own else settings_to_be_carried(on_kind)

@@ -325,7 +325,7 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
         sections = (
             section for data in only or bus.evidence_data for section in sections_of(bus, data, progress=progress)
         )
-        return KindEvidence(name, bus.title, parts_tested(bus.evidence_data), tuple(sections))
+        return KindEvidence(name, bus.title, parts_tested(bus.evidence_data, of_kind=True), tuple(sections))
 
     if paper:
         return EvidenceAnswer((of_kind(*_PAPER),), paper=True)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import product
 from math import isinf
@@ -11,7 +11,19 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle
-from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure, by_key, term_name
+from busplan.buses.figure import (
+    BIAS,
+    CERTAINTY,
+    MARGIN,
+    MARGIN_CORRECTED,
+    REQUIRED,
+    SAFE_MIN_PERIOD,
+    SAFE_NODES,
+    UNCERTAINTY,
+    Figure,
+    by_key,
+    term_name,
+)
 from busplan.buses.network import Network
 from busplan.elementwise import Number, Traced, TracedConstant, value_of, worded
 from busplan.english import listed
@@ -33,6 +45,18 @@ GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "pu
 _MOST_HINTS: Final = 3
 _BESIDE: Final = MappingProxyType({MARGIN_CORRECTED.key: (UNCERTAINTY,)})
 """Figures that are derived together with another: a margin says nothing without its uncertainty."""
+
+
+_ON_THE_CARD: Final = MappingProxyType(
+    {
+        "used": (REQUIRED.key, BIAS.key),
+        "free": (MARGIN_CORRECTED.key,),
+        "shortby": (MARGIN_CORRECTED.key,),
+        "fastestperiod": (SAFE_MIN_PERIOD.key,),
+        "roomfor": (SAFE_NODES.key,),
+    }
+)
+"""Keys of the figures behind a line of the card of `capacity`, by its label."""
 
 
 class Step(NamedTuple):
@@ -70,6 +94,8 @@ class Derivation:
     steps: tuple[Step, ...]
     """Steps in the order of computation. The last one is the figure, unless that is an input."""
     inputs: tuple[Input, ...]
+    corrected_us: float | None = None
+    """Of a margin by the model that decides, the corrected one, which the verdict uses [us]."""
 
     @property
     def reference(self) -> str:
@@ -123,7 +149,9 @@ def _at_period(network: Network, meant: Wanted, timing_models: Sequence[str] | N
             traced = numbers[model][transaction]
             for shown in (figure, *_BESIDE.get(figure.key, ())):
                 if shown.key in traced:
-                    yield _derivation(network, traced[shown.key], meant.command, shown, model, transaction or None)
+                    found = _derivation(network, traced[shown.key], meant.command, shown, model, transaction or None)
+                    uses = traced.get(MARGIN_CORRECTED.key) if shown.key == MARGIN.key else None
+                    yield found if uses is None else replace(found, corrected_us=float(value_of(uses)))
 
 
 def _derivation(
@@ -159,7 +187,7 @@ def _why_none(network: Network, meant: Wanted, timing_models: Sequence[str] | No
         return f"{figure.key}: does not exist under this timing model, or for this transaction"
     return (
         f"{figure.key}: no equation leads to it in {network.profile.name} ({figure.meaning}); busplan explain "
-        f"{network.profile.name} lists the figures with an equation"
+        f"{network.profile.name} --all lists the figures with an equation"
     )
 
 
@@ -262,6 +290,7 @@ def wanted(name: str, network: Network) -> Wanted:
         lambda figure: equation is not None and figure.reference == f"({equation[1]})",
         lambda figure: equation is not None and f"({equation[1]})" in figure.reference.split(),
         lambda figure: _letters(key) in _names(figure) - {""},
+        lambda figure: figure.key in _ON_THE_CARD.get(_letters(key), ()),
         lambda figure: key == figure.symbol,
     ):
         for command in commands:
@@ -274,7 +303,7 @@ def wanted(name: str, network: Network) -> Wanted:
         timed = network.bus.figures
         main = timed.deadlines[0] if timed.deadlines else timed.latency_main or timed.latency_table[-1].key
         return Wanted("latency", (register["latency"][main],), transactions or None)
-    raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
+    raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain --all lists them")
 
 
 def _names(figure: Figure) -> set[str]:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
+from busplan.buses.figure import MARGIN_CORRECTED
 from busplan.english import plural
 from busplan.forms.blocks import (
     Block,
@@ -21,6 +22,8 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     Words,
+    figure_value,
+    sentence,
 )
 from busplan.forms.numbers import figure_text, period_value
 from busplan.questions.base.sentences import document, fields, with_profile
@@ -53,7 +56,7 @@ _USED: Final = (
 )
 _FIGURES: Final = (
     *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
-    TableColumn("eq", kind="words", rank=2),
+    TableColumn("source", kind="words", rank=2),
     TableColumn("unit", kind="words", rank=1),
     TableColumn("meaning", kind="words", wraps=True),
 )
@@ -81,7 +84,7 @@ def assumptions_report(answer: ExplainAnswer) -> Report:
         Sentence(("The figures of ", Code(profile.name))),
         (
             Table((*_KNOWN, _MEANING), tuple(inputs), caption, stacks=True),
-            Detail((table,), "meanings of the figures", (Sentence((f"Figures to explain: {', '.join(names)}.",)),)),
+            Detail((table,), f"{plural(len(names), 'figure')} to explain", (_example(profile.name, names),)),
         ),
         document(
             "explain",
@@ -93,6 +96,12 @@ def assumptions_report(answer: ExplainAnswer) -> Report:
         ),
         records,
     )
+
+
+def _example(name: str, figures: Iterable[str]) -> Sentence:
+    """How to ask for a figure: the required time, or the first where a profile has no cycle."""
+    figure = "required_us" if "required_us" in figures else next(iter(figures), "FIGURE")
+    return Sentence((Code(f"busplan explain {name} {figure}"), " explains a figure."))
 
 
 def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:
@@ -155,10 +164,18 @@ def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
     title = Sentence((Code(figure.key), " of ", Code(name), *period, f", {_of(derivation)}: ", result))
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {derivation.reference}.",))
     steps = Calculation(tuple(map(_step, derivation.steps)))
+    uses = tuple(_used_by_the_verdict(derivation))
     if len(derivation.steps) <= _MOST_STEPS and len(derivation.inputs) <= _MOST_INPUTS:
-        return Chapter(title, (about, steps, below))
+        return Chapter(title, (about, steps, below, *uses))
     adds = f"{plural(len(derivation.steps), 'step')} and {plural(len(derivation.inputs), 'input')}"
-    return Chapter(title, (about, Detail((steps, below), adds, tuple(_last_step(derivation)))))
+    return Chapter(title, (about, Detail((steps, below), adds, tuple(_last_step(derivation))), *uses))
+
+
+def _used_by_the_verdict(derivation: Derivation) -> Iterator[Sentence]:
+    """The margin that the verdict uses, after one that it does not."""
+    if derivation.corrected_us is not None:
+        value = figure_value(MARGIN_CORRECTED, derivation.corrected_us)
+        yield sentence("The verdict uses {}, {}.", Code(MARGIN_CORRECTED.key), value)
 
 
 _MOST_STEPS: Final = 4

@@ -162,6 +162,11 @@ class HeavyAssumption(NamedTuple):
         """Whether the keys are execution times."""
         return self.keys[0].endswith(f".{_EXECUTION}")
 
+    @property
+    def is_bit_rate(self) -> bool:
+        """Whether the key is a bit rate, which is looked up and not measured."""
+        return self.keys[0].endswith("bit_rate_kbit_s")
+
     def covers(self, key: str) -> bool:
         """Whether a key is one of `keys`, or in a section among them."""
         return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)

@@ -103,10 +103,8 @@ def _blocks(answer: MapAnswer) -> Iterator[Block]:
         yield _values_table(answer)
         return
     title = " against ".join(title_of(direction, answer.profile) for direction in answer.directions)
-    steps = "" if all(map(_is_even, answer.directions)) else ", in unequal steps"
-    marked = "" if answer.design is None else ", this design marked"
-    caption = sentence(f"{{}} of {{}} settings fit, {title}{steps}{marked}", *_counts(answer))
-    yield Chart(map_drawing(answer), caption)
+    steps = "" if all(map(_is_even, answer.directions)) else "; steps are unequal"
+    yield Chart(map_drawing(answer), Sentence((f"{title[:1].upper()}{title[1:]}{steps}",)))
     yield _regions_table(answer, looks)
 
 
@@ -150,7 +148,10 @@ def _looks(answer: MapAnswer) -> _Looks:
     """The look of each region: that of its state, with a letter for each limit where no period helps."""
     looks = {(region.state, region.reasons): LOOKS[region.state] for region in answer.regions}
     barred = [limits for state, limits in looks if state == "does not fit" and limits != (TIME,)]
-    marks = zip(barred, letters(map("".join, barred)), strict=True)
+    # A limit alone has its own letter first; several together have b for both.
+    barred.sort(key=len)
+    names = (limits[0] if len(limits) == 1 else f"both{''.join(limits)}" for limits in barred)
+    marks = zip(barred, letters(names), strict=True)
     return looks | {("does not fit", limits): _BARRED._replace(mark=mark) for limits, mark in marks}
 
 
@@ -308,7 +309,8 @@ def _setting_words(answer: MapAnswer, cell: Cell) -> str:
     values = answer.values_at(cell)
     for direction in reversed(answer.directions):
         text = value_text(direction, values[direction.key])
-        words.append(f"{text} axes" if direction.key == AXES else f"{title_of(direction, answer.profile)} {text}")
+        axes = nouns(1 if text == "1" else 2, "axis")
+        words.append(f"{text} {axes}" if direction.key == AXES else f"{title_of(direction, answer.profile)} {text}")
     return ", ".join(words)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
+from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
@@ -20,6 +20,7 @@ from busplan.forms.blocks import (
     attribute_value,
 )
 from busplan.forms.numbers import MISSING, period_value
+from busplan.profile.edit import whole
 from busplan.profile.kinds import flat
 from busplan.questions.base.sentences import (
     NewValues,
@@ -31,7 +32,6 @@ from busplan.questions.base.sentences import (
     warning_sentences,
     with_profile,
 )
-from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
@@ -65,6 +65,8 @@ def _blocks(plan: PlanAnswer) -> Iterator[Block]:
     yield from warning_sentences(plan.warnings)
     yield from reset_sentence(plan.after_reset)
     yield _options_table(plan)
+    if idle := [option.title.removeprefix("+ ") for option in plan.options if _is_idle(plan, option)]:
+        yield Sentence((f"No help: {', '.join(idle)}.",))
     mark = "" if plan.recommended is None else "* recommended. "
     circle = " No circle was run: a plan is of the bus alone." if plan.profile.asks_for_circle else ""
     yield Sentence((f"{mark}'Held by' names the limit that keeps a row from fitting.{circle}",))
@@ -89,10 +91,12 @@ def _headline(plan: PlanAnswer) -> Sentence:
         why = ShownValue("" if plan.binding is None else plan.binding.why, "why")
         none = Words("NO PLAN", "fails")
         return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
-    margin = (" with a margin of ", *margin_parts(option.deciding)) if option.deciding.terms else ()
+    margin = (" with a corrected margin of ", *margin_parts(option.deciding)) if option.deciding.terms else ()
     result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
-        return Sentence((*subject, ": nothing to change; it ", *result), "passes")
+        wanted = settings(plan.meanings, dict(flat({key: whole(value) for key, value in plan.wanted.items()})))
+        what = (*wanted.parts, " is all that changes") if plan.wanted else ("nothing to change",)
+        return Sentence((*subject, ": ", *what, "; it ", *result), "passes")
     first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
     changes = settings(plan.meanings, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
@@ -149,37 +153,35 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
 
 
 def _options_table(plan: PlanAnswer) -> Table:
-    """Settings and results of each option; the recommended one has a mark."""
+    """Settings and results of each step that changes something; the recommended one has a mark."""
+    has_counts = any(option.deciding.safe_nodes is not None for option in plan.options)
     columns = (
-        TableColumn("option", kind="words"),
+        TableColumn("free to change", kind="words"),
         TableColumn("", kind="words"),
         TableColumn("set", kind="words", wraps=True),
         TableColumn("largest term", kind="words", rank=2),
         TableColumn("held by", kind="words"),
-        *(TableColumn(heading, "us") for heading in ("margin", "+/-")),
-        *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes")),
+        TableColumn(MARGIN_CORRECTED.label, "us"),
+        *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes") if has_counts),
     )
-    return Table(columns, tuple(map(_row, plan.options)), heads=2)
+    shown = (option for option in plan.options if not _is_idle(plan, option))
+    return Table(columns, tuple(_row(option, has_counts=has_counts) for option in shown), heads=2)
 
 
-def _row(option: Option) -> TableRow:
+def _is_idle(plan: PlanAnswer, option: Option) -> bool:
+    """Whether a step of the search changes nothing that the step before it did not."""
+    place = plan.options.index(option)
+    return place > 0 and option.changes == plan.options[place - 1].changes
+
+
+def _row(option: Option, *, has_counts: bool) -> TableRow:
     cells: tuple[Cell, ...] = (
         option.title,
         "*" * option.recommended,
         settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
         option.deciding.bus_figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
-        *_margin(option),
-        *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
+        Sentence(margin_parts(option.deciding, unit=False)) if option.deciding.terms else MISSING,
+        *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES) if has_counts),
     )
     return TableRow(cells, highlighted=option.recommended)
-
-
-def _margin(option: Option) -> tuple[ShownValue, ShownValue]:
-    """Margin less the bias, and its uncertainty."""
-    figures = option.deciding
-    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
-    # A margin beyond its uncertainty is none of the causes where limits of the bus are.
-    beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
-    is_enough = figures.verdict == FITS or (beyond_us > 0 and figures.behind)
-    return margin._replace(state="neutral" if is_enough else "fails"), doubt

@@ -70,7 +70,7 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
     fitting = (
         sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(rows[VERDICT.key] == FITS)))
         if model == sweep.deciding_model
-        else sentence(f"{{}} fit by the closed form of the {model} model", _points(np.sum(rows["fits"])))
+        else sentence(f"{{}} fit by the {model} model", _points(np.sum(rows["fits"])))
         for model, rows in _by_model(sweep, table)
     )
     yield joined(head, joined(*fitting, by=", "), Sentence((".",)), by="")

@@ -305,7 +305,7 @@ def _totals_table(schedule: Schedule) -> Table:
     part = whole if schedule.is_whole else "the window"
     return Table(
         (
-            *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words", rank=1)),
+            *(TableColumn("kind", kind="words"), TableColumn("source", kind="words", rank=1)),
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(schedule, total) for total in totals(schedule)),
