@@ -232,7 +232,7 @@ def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
     yield from answer.deadlines
     if loop and not register.deadlines:
         whole = register.latency_table[-1].key
-        times = (ShownValue(phases[name][whole], whole, "us", 0) for name in ("command", "feedback", "loop"))
+        times = [ShownValue(phases[name][whole], whole, "us", 0) for name in ("command", "feedback", "loop")]
         yield sentence("A command acts after {}, feedback is {} old, a loop takes {}.", *times)
     yield from _tables(answer)
     if loop and register.deadlines and loop[register.deadlines[0]] is not None:

@@ -94,7 +94,7 @@ def _headline(plan: PlanAnswer) -> Sentence:
     margin = (" with a corrected margin of ", *margin_parts(option.deciding)) if option.deciding.terms else ()
     result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
-        wanted = settings(plan.meanings, dict(flat({key: whole(value) for key, value in plan.wanted.items()})))
+        wanted = settings(plan.meanings, {key: whole(value) for key, value in flat(plan.wanted)})
         what = (*wanted.parts, " is all that changes") if plan.wanted else ("nothing to change",)
         return Sentence((*subject, ": ", *what, "; it ", *result), "passes")
     first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
