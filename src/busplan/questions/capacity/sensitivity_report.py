@@ -274,7 +274,8 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> Se
         margin_us = bottleneck.next_margin_corrected_us
         margin = ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))
         text = (
-            f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, and the corrected margin {{}}"
+            f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, "
+            "and the corrected margin {}"
         )
         of_term = sentence(text, us, next_us, margin)
     else:
