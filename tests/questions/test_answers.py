@@ -85,8 +85,8 @@ HEADLINES = {
     "latency": "<LatencyAnswer: paper-1ms: farthest of 2 nodes, 2 hops, gap count 63>",
     # 263.320 us of 500 us by the standard, a bias of 8 * 0.827 us; the paper says 207.117 us.
     "capacity": "<CapacityAnswer: paper-1ms IEEE 1394, 2 nodes, 8 axes, 1 ms FITS>",
-    "circle_test": "<CircleTestAnswer: paper-1ms at 1 ms and 10000 mm/min: the circle holds, mean contour error 4.871 "
-    "um of 6 um, largest contour error 22.085 um of 25 um.>",
+    "circle_test": "<CircleTestAnswer: paper-1ms at 1 ms and 10000 mm/min: the circle holds, mean contour error "
+    "4.871 um of 6 um, largest contour error 22.085 um of 25 um.>",
     "plan": "<PlanAnswer: paper-1ms with 2 nodes (8 axes) at 1 ms: nothing to change; it fits with a corrected margin "
     "of 230 us +/- 6 us.>",
     "timeline": "<TimelineAnswer: paper-1ms at 1 ms: fits by the standard model; used 270 us of the 500 that the bus "
@@ -99,7 +99,7 @@ HEADLINES = {
     "diff": "<DiffAnswer: paper-1ms (A) fits, paper-optimal-gap (B) fits; B is better in 16 figures: corrected margin, "
     "safe nodes, safe axes, period with enough time and 12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, standard model: 236.6798 us>",
-    "explain all": "<ExplainAnswer: paper-1ms: 31 assumptions behind its verdict>",
+    "explain all": "<ExplainAnswer: paper-1ms: 32 assumptions behind its verdict>",
     "calibrate": "<CalibrateAnswer: paper-1ms: T_exec is the median at each payload, of 8 measurements at 8 payloads, "
     "table-1.csv.>",
     "report": "<ReportAnswer: paper-1ms: fits>",

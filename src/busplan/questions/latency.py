@@ -236,9 +236,9 @@ def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
         yield sentence("A command acts after {}, feedback is {} old, a loop takes {}.", *times)
     yield from _tables(answer)
     if loop and register.deadlines and loop[register.deadlines[0]] is not None:
-        times = [ShownValue(loop[key], key, "us", 0) for key in (register.deadlines[0], "pipeline_us") if loop[key]]
-        of_host = ", of which {} are the host's cycles" if len(times) > 1 else ""
-        yield sentence(f"Loop: {{}} from SYNC to the executed command{of_host}.", *times)
+        parts = [ShownValue(loop[key], key, "us", 0) for key in (register.deadlines[0], "pipeline_us") if loop[key]]
+        of_host = ", of which {} are the host's cycles" if len(parts) > 1 else ""
+        yield sentence(f"Loop: {{}} from SYNC to the executed command{of_host}.", *parts)
     yield from answer.notes
 
 

@@ -358,9 +358,3 @@ def test_the_lines_of_the_card_are_names_and_the_margin_names_the_one_that_decid
     assert keys("free") == ["margin_corrected_us", "uncertainty_us"]
     assert keys("fastest period") == ["safe_min_period_us"]
     assert "The verdict uses margin_corrected_us, 932.012 us." in str(busplan.explain("gantry-24", "margin"))
-    # 1700 us less the time that is used.
-    required, bias, corrected = (
-        busplan.explain("gantry-24", name).to_dict()["derivations"][0]["value"]
-        for name in ("required_us", "bias_us", "margin_corrected_us")
-    )
-    assert 1700 - required - bias == pytest.approx(corrected)

@@ -145,7 +145,7 @@ def test_the_table_says_what_takes_how_much_of_what() -> None:
         "Use of the cycle, 263.320 us",
     ]
     lines = drawn(plan())
-    assert lines[-2].split() == [".", "subaction", "gap", "(10)", "4", "42.196", "2.11"]
+    assert lines[-2].split() == [",", "subaction", "gap", "(10)", "4", "42.196", "2.11"]
     paper = drawn(busplan.timeline("paper-4ms", timing_model="paper"))
     assert paper[-2].split() == [":", "arbitration", "reset", "gap", "(10)", "4", "21.047", "1.05"]
 

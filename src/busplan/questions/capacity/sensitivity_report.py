@@ -273,8 +273,11 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> Se
     if bottleneck.next_margin_corrected_us is not None:
         margin_us = bottleneck.next_margin_corrected_us
         margin = ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))
-        then = f"the largest term is {next_label}, {{}}, and the corrected margin {{}}"
-        of_term = sentence(f"Next bottleneck: without {label}, now {{}}, {then}", us, next_us, margin)
+        text = (
+            f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, "
+            "and the corrected margin {}"
+        )
+        of_term = sentence(text, us, next_us, margin)
     else:
         then = f"the next term is {next_label}, {{}}"
         of_term = sentence(f"Next bottleneck: no key removes {label}, {{}}; {then}", us, next_us)

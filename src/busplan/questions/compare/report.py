@@ -174,7 +174,7 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
     defaults = len(machine.assumed) - len(new)
     count = f"{defaults} {nouns(defaults, 'default')}" if defaults else ""
     best = {} if machine.best is None else machine.best.changes
-    with_best = f"; smallest period with {', '.join(f'{key} = {short_text(best[key])}' for key in best)}"
+    with_best = f" (smallest period: {', '.join(f'{key} = {short_text(best[key])}' for key in best)})"
     cells: tuple[Cell, ...] = (
         f"{machine.title}{', as it is' if machine.is_own else with_best if best else ''}",
         ShownValue(machine.smallest.us, "smallest_period_us", "us", 3),

@@ -1,6 +1,7 @@
 """Answer of `busplan plan`: its sentences, the table of its options, and its document."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES
 from busplan.english import listed, nouns
@@ -94,9 +95,11 @@ def _headline(plan: PlanAnswer) -> Sentence:
     margin = (" with a corrected margin of ", *margin_parts(option.deciding)) if option.deciding.terms else ()
     result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
-        wanted = settings(plan.meanings, {key: whole(value) for key, value in flat(plan.wanted)})
-        what = (*wanted.parts, " is all that changes") if plan.wanted else ("nothing to change",)
-        return Sentence((*subject, ": ", *what, "; it ", *result), "passes")
+        if not plan.wanted:
+            return Sentence((*subject, ": nothing to change; it ", *result), "passes")
+        written: dict[str, Any] = dict(flat({key: whole(value) for key, value in plan.wanted.items()}))
+        wanted = settings(plan.meanings, written)
+        return Sentence((*subject, ": ", *wanted.parts, " is all that changes; it ", *result), "passes")
     first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
     changes = settings(plan.meanings, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
