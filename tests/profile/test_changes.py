@@ -13,7 +13,7 @@ from busplan import BusplanError, Profile
 from busplan.buses import kind_names
 from busplan.profile.changes import KeyChange, KeyChanges, parse_set
 
-KINDS = " or ".join(f'"{one}"' for one in kind_names())
+KINDS = listed([f'"{one}"' for one in kind_names()], "or")
 
 
 def test_a_value_is_toml_and_a_word_is_text() -> None:
