@@ -1,11 +1,13 @@
 """Words at a mistake name what to type instead, and the next command can be typed."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.conftest import Busplan
+Busplan = Callable[..., Any]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan import BusplanError, Profile
 from busplan.buses import kind_names
+from busplan.english import listed
 from busplan.profile.changes import KeyChange, KeyChanges, parse_set
 
 KINDS = listed([f'"{one}"' for one in kind_names()], "or")
