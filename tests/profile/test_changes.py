@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 import busplan
 from busplan import BusplanError, Profile
 from busplan.buses import kind_names
+from busplan.english import listed
 from busplan.profile.changes import KeyChange, KeyChanges, parse_set
 
-KINDS = " or ".join(f'"{one}"' for one in kind_names())
+KINDS = listed([f'"{one}"' for one in kind_names()], "or")
 
 
 def test_a_value_is_toml_and_a_word_is_text() -> None:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan import BusplanError, Profile
 from busplan.buses import kind_names
+from busplan.english import listed
 from busplan.errors import PlacedError, PlacedProblem
 
 MAX_FILE_BYTES: Final = 2_000_000
@@ -84,7 +85,7 @@ def test_the_text_of_these_tests_is_a_profile() -> None:
 
 # --- one fault, one message -------------------------------------------------------------------------------
 
-KINDS = " or ".join(f'"{one}"' for one in kind_names())
+KINDS = listed([f'"{one}"' for one in kind_names()], "or")
 FAULTS = {
     "wrong type, text": ("nodes = 2", 'nodes = "2"', '7:1: bus.nodes = "2": expected a whole number'),
     "wrong type, bool": ("nodes = 2", "nodes = true", "7:1: bus.nodes = true: expected a whole number"),
