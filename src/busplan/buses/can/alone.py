@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from math import inf
-from typing import Final, Literal, Self
+from typing import ClassVar, Final, Literal, Self
 
-from busplan.buses.can.equations import TERMS, c
+from busplan.buses.can.equations import TERMS, CanMessageFigures, c
 from busplan.buses.can.latency import phases
 from busplan.buses.can.traffic import NO_DEADLINE_US, NOT_BY_PRIORITY, REPEATED, Message, Traffic, traffic_of
 from busplan.buses.can.waiting import message_responses
@@ -44,6 +44,7 @@ class CanCycle(BusCycle):
     """A network of messages alone: it has loads and response times, and a cycle in which no term takes time."""
 
     term_figures = TERMS
+    record: ClassVar[type[CanMessageFigures]] = CanMessageFigures
     premises = tuple(premise for premise in PREMISES if premise.key not in _OF_CYCLE)
 
     def __init__(

@@ -10,6 +10,7 @@ from busplan.buses.ethercat.equations import (
     LATENCY_TABLE,
     MEAN,
     TERMS,
+    EthercatFigures,
     c,
     cable_us,
     frame_bytes,
@@ -89,6 +90,7 @@ class EthercatCycle(BusCycle):
     """The master's time and jitter, frames, devices and cables there and back, and the non-periodic window."""
 
     term_figures = TERMS
+    record = EthercatFigures
     premises = PREMISES
 
     def __init__(self, network: Network, model: str, number: int | None = None) -> None:

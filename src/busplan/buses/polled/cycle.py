@@ -1,11 +1,12 @@
 """The cycle of a polled bus: request, turn-around and answer of each node."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Final, Literal
 
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise, Run
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.polled.protocols import ProtocolFigures, Requests, Times, c, protocol_of, times
@@ -63,6 +64,25 @@ _BY_CLOCK: Final = (
 )
 """Terms timed by the clocks of the bit rate; of the turn-around they time all but the nodes' own time."""
 FIGURES: Final = BusFigures(TERMS, setup=(RATE,), headings=(RATE.key,))
+
+
+@dataclass(frozen=True)
+class PolledFigures(OwnFigures):
+    """Figures of polled buses alone, by the keys of `FIGURES`."""
+
+    bit_rate_kbit_s: float
+    cycle_once_us: float
+    cycle_global_us: float
+    cycle_request_us: float
+    cycle_turn_us: float
+    cycle_answer_us: float
+    cycle_gap_us: float
+    cycle_adapter_us: float
+    cycle_retry_us: float
+    cycle_host_us: float
+    nonperiodic_us: float
+
+
 EVENTS: Final = (
     EventKind("once", "token and GAP", _WIRE, "t", "sync"),
     EventKind("global", "global control", _WIRE, "s", "sync"),
@@ -97,6 +117,7 @@ class PolledCycle(BusCycle):
     """All feedback, then all commands; or an exchange with each node in turn."""
 
     term_figures = TERMS
+    record = PolledFigures
     premises = PREMISES
     command_events = (("exchange", "request"), ("write", "request"))
 
