@@ -116,10 +116,8 @@ def test_three_frames_in_a_cycle() -> None:
     )
     (result,) = busplan.capacity(plan, timing_model=["last-byte"]).results
     # 74 drives fill the first frame with 1480 bytes, 26 go with a camera, and the other camera has no room beside it.
-    assert (busplan.EthercatFigures.of(result).frames, busplan.EthercatFigures.of(result).process_bytes) == (
-        3,
-        100 * 20 + 2 * 900,
-    )
+    packed = busplan.EthercatFigures.of(result)
+    assert (packed.frames, packed.process_bytes) == (3, 100 * 20 + 2 * 900)
     last = 52 + 900
     sent = (3 * 52 + 3800) * BYTE_US
     assert result.required_us == pytest.approx(20 + sent + 102 * E_BUS_US)

@@ -257,3 +257,9 @@ def test_equation_11_as_published_at_the_profiles_own_nodes(make: Make) -> None:
     by_hand = (figures["available_us"] - 0.4) / (2 * (figures["read_latency_us"] + figures["gaps_us"]))
     assert figures["read_latency_us"] == figures["write_latency_us"]
     assert figures["nodes_eq11"] == pytest.approx(by_hand, rel=1e-14)
+
+
+def test_figures_of_another_kind_are_refused() -> None:
+    (result, *_) = busplan.capacity("paper-4ms").results
+    with pytest.raises(busplan.BusplanError, match="the figures are Ieee1394Figures, not CanFigures"):
+        busplan.CanFigures.of(result)
