@@ -18,22 +18,29 @@ __version__ = "1.0.0"
 __all__ = [
     "BusplanError",
     "CalibrateAnswer",
+    "CanFigures",
+    "CanMessageFigures",
     "CapacityAnswer",
     "CheckAnswer",
     "CircleTestAnswer",
     "CompareAnswer",
     "DiffAnswer",
     "EmulateAnswer",
+    "EthercatFigures",
     "EvidenceAnswer",
     "ExplainAnswer",
     "ExploreAnswer",
+    "Ieee1394Figures",
     "ImportAnswer",
     "LatencyAnswer",
     "MapAnswer",
     "MeasuredAnswer",
     "PlanAnswer",
+    "PolledFigures",
     "Profile",
     "ReportAnswer",
+    "Sercos2Figures",
+    "Sercos3Figures",
     "SweepAnswer",
     "TimelineAnswer",
     "__version__",
@@ -59,6 +66,12 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from busplan.buses.can.equations import CanFigures, CanMessageFigures
+    from busplan.buses.ethercat.equations import EthercatFigures
+    from busplan.buses.ieee1394.figures import Ieee1394Figures
+    from busplan.buses.polled.cycle import PolledFigures
+    from busplan.buses.sercos.sercos2 import Sercos2Figures
+    from busplan.buses.sercos.sercos3 import Sercos3Figures
     from busplan.errors import BusplanError
     from busplan.gate.check import CheckAnswer, check
     from busplan.questions.base.arguments import load_profile
@@ -87,6 +100,13 @@ else:
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",
         "load_profile": "busplan.questions.base.arguments",
+        "CanFigures": "busplan.buses.can.equations",
+        "CanMessageFigures": "busplan.buses.can.equations",
+        "EthercatFigures": "busplan.buses.ethercat.equations",
+        "Ieee1394Figures": "busplan.buses.ieee1394.figures",
+        "PolledFigures": "busplan.buses.polled.cycle",
+        "Sercos2Figures": "busplan.buses.sercos.sercos2",
+        "Sercos3Figures": "busplan.buses.sercos.sercos3",
         "check": "busplan.gate.check",
         "CheckAnswer": "busplan.gate.check",
         "import_profile": "busplan.questions.import_",

@@ -7,6 +7,7 @@ What it shows: a kind is its own section, terms, events, limits, settings, rules
 import csv
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from io import StringIO
 from math import hypot
@@ -22,7 +23,7 @@ from busplan.buses import kind_names, registered
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise
 from busplan.buses.cycle import Run as EventRun
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import (
     Cost,
     EventKind,
@@ -87,10 +88,21 @@ ROUNDS = Figure("rounds", "n_r", "ring", "rounds of the token", "rounds of the t
 TERMS = (DATA, TOKEN, NONPERIODIC)
 
 
+@dataclass(frozen=True)
+class RingFigures(OwnFigures):
+    """Figures of the invented kind."""
+
+    rounds: int
+    cycle_data_us: float
+    cycle_token_us: float
+    nonperiodic_us: float
+
+
 class RingCycle(BusCycle):
     """Data of every station, and a round of the token for every few of them."""
 
     term_figures = TERMS
+    record = RingFigures
 
     def __init__(self, network: Network, model: str) -> None:
         self.network, self.model = network, model
@@ -283,7 +295,7 @@ def changed(profile: Path, **values: object) -> Profile:
 
 def test_its_figures_are_those_by_hand(ring: Path) -> None:
     (one,) = busplan.capacity(ring).results
-    assert (one.required_us, one.own["rounds"], one.own["cycle_token_us"]) == (NEEDED_US, 2, 10)
+    assert (one.required_us, RingFigures.of(one).rounds, RingFigures.of(one).cycle_token_us) == (NEEDED_US, 2, 10)
     assert (one.kind, one.timing_model, one.fits) == ("ring", "plain", True)
     assert {term.key: term.us for term in one.terms} == {
         "cycle_data_us": 640,

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import chain
 from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeAlias
 
-from busplan.buses.figure import REQUIRED, Figure, term_name
+from busplan.buses.figure import REQUIRED, Figure, OwnFigures, term_name
 from busplan.buses.network import Group, Network, Rate
 from busplan.elementwise import Number, is_off, total
 
@@ -174,6 +174,8 @@ class BusCycle(ABC):
     """Cycle of the hyperperiod (the common multiple of the rates), from 1; None for the cycle of the verdict."""
     term_figures: ClassVar[tuple[Figure, ...]]
     """Figures of the terms, in their order."""
+    record: ClassVar[type[OwnFigures]]
+    """Record of the `figures` and, where the network has a cycle, of the terms."""
     premises: ClassVar[tuple[Premise, ...]] = ()
     """Assumptions of the kind while a profile does not give a key, the most important first."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()

@@ -5,10 +5,12 @@ are in this module; a kind of bus adds its own.
 """
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, Protocol, Self
 
 from busplan.buses import time_slice
+from busplan.errors import BusplanError
 from busplan.sourced import EQUATIONS, read_toml
 
 Sort = Literal["number", "count", "truth", "word", "words"]
@@ -313,6 +315,29 @@ def _read_figure(key: str, fields: dict[str, Any]) -> Figure:
     if fields.get("decimals") == "all":
         fields["decimals"] = None
     return Figure(key, **fields) if fields else _OF_EVERY_BUS[key]
+
+
+class HasOwn(Protocol):
+    """Figures of an answer, among them those of the kind of bus."""
+
+    @property
+    def own(self) -> "OwnFigures":
+        """Figures of the kind."""
+
+
+@dataclass(frozen=True)
+class OwnFigures:
+    """Figures and terms that only a kind of bus has, in plain numbers: each kind declares its record.
+
+    A field has the name of a figure's key, so JSON, CSV and Python have the same names.
+    """
+
+    @classmethod
+    def of(cls, figures: HasOwn) -> Self:
+        """Record of the kind in the figures of an answer; BusplanError for figures of another kind."""
+        if isinstance(figures.own, cls):
+            return figures.own
+        raise BusplanError(f"the figures are {type(figures.own).__name__}, not {cls.__name__}")
 
 
 class BusFigures(NamedTuple):

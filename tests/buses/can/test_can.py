@@ -90,7 +90,7 @@ def test_a_pdo_for_each_axis_shares_the_payload() -> None:
 
 def test_its_load_counts_every_message() -> None:
     found = figures(profile())
-    assert found.own["bus_load"] == pytest.approx((110 + 3 * 420 + 3 * 230) / 6000 + 150 / 2000)
+    assert found.own.bus_load == pytest.approx((110 + 3 * 420 + 3 * 230) / 6000 + 150 / 2000)
     assert (found.verdict, found.bias_us) == ("fits", None)
     assert found.uncertainty_us == pytest.approx(2 * 2 * 0.1 / 12**0.5)
 
@@ -408,7 +408,7 @@ def test_six_nodes_with_service_messages_fit_four_milliseconds(run: Run, tmp_pat
     text = text.replace('grade = "assumed"          # between 0', 'grade = "measured" # not between 0')
     path.write_text("\n".join((text, *sections)), encoding="utf-8")
     found, _ = busplan.capacity(path).results
-    assert found.own["bus_load"] == pytest.approx(0.787, abs=1e-3)
+    assert busplan.CanFigures.of(found).bus_load == pytest.approx(0.787, abs=1e-3)
     assert (found.verdict, found.exceeded) == ("fits", ())
     # Three service frames block: one of a kind may be late by its period, and the next be there.
     assert {term.name: term.us for term in found.terms}["blocking"] == 3 * 270
@@ -515,5 +515,5 @@ def test_a_cycle_waits_for_the_messages_that_arrive_in_it_and_for_no_more(load: 
     while lasts_us != before_us:
         before_us = lasts_us
         lasts_us = own_us + sum(ceil((before_us + 1) / period_us) * frame_us for period_us in periods_us)
-    assert 0.48 < figures(own).own["bus_load"] < 0.99
+    assert 0.48 < figures(own).own.bus_load < 0.99
     assert sum(terms(own).values()) == pytest.approx(lasts_us, rel=1e-12)

@@ -79,7 +79,9 @@ def test_a_published_network_of_five_messages() -> None:
     )
     us = responses(own)
     assert (us[0], us[3], us[4]) == (420, 1230, 1230)
-    assert busplan.capacity(own).verdicts[0].deciding.own["bus_load"] == pytest.approx(0.139, abs=5e-4)
+    assert busplan.CanMessageFigures.of(busplan.capacity(own).verdicts[0].deciding).bus_load == pytest.approx(
+        0.139, abs=5e-4
+    )
 
 
 def test_the_worst_instance_is_not_the_first() -> None:
@@ -221,7 +223,7 @@ def test_the_verdict_is_by_load_and_deadlines() -> None:
     figures = answer.verdicts[0].deciding
     bits = ((1000 / 33.3) * length for length in (55, 80 + 20, 80 + 60))
     load = sum(us / period_us for us, period_us in zip(bits, (1e6, 1e5, 1e5), strict=True))
-    assert figures.own["bus_load"] == pytest.approx(load)
+    assert busplan.CanMessageFigures.of(figures).bus_load == pytest.approx(load)
     assert (figures.verdict, figures.nodes) == ("fits", 0)
     for key in (
         "period_us",
@@ -317,7 +319,9 @@ def test_every_question_on_messages_of_either_length_is_answered(
     each = (
         busplan.capacity(busplan.load_profile(own, changes={"bus.identifier_bits": each})).results for each in (11, 29)
     )
-    assert list(loads) == pytest.approx([result.own["bus_load"] for results in each for result in results])
+    assert list(loads) == pytest.approx(
+        [busplan.CanMessageFigures.of(result).bus_load for results in each for result in results]
+    )
 
 
 def test_a_length_that_no_message_has_is_no_setting(run: Run, tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_a_message_of_each_node_is_that_many_messages(nodes: int) -> None:
         cycle=period,
     )
     assert terms(together) == pytest.approx(terms(alone))
-    assert figures(together).own["bus_load"] == pytest.approx(figures(alone).own["bus_load"])
+    assert figures(together).own.bus_load == pytest.approx(figures(alone).own.bus_load)
     assert figures(together).verdict == figures(alone).verdict
     us = responses(alone)
     # The last of them waits longest.
@@ -217,7 +217,7 @@ def test_two_more_bits_of_each_fd_frame_are_a_doubt_of_the_cycle() -> None:
 
 def test_load_and_deadline_are_kept_with_two_more_bits_and_broken_without() -> None:
     own = late_by_two_bits()
-    load, us = figures(own).own["bus_load"], responses(own)["fd"]
+    load, us = figures(own).own.bus_load, responses(own)["fd"]
     longest, before_us = load + 2 * (7 / 8000 + 1 / 1e5), 2 * (7 + 1)
     for verdict, most in (
         ("fits", longest + 1e-6),
@@ -238,7 +238,7 @@ def test_the_gate_reports_what_two_more_bits_leave_open(
     run: Run, tmp_path: Path, key: str, share: float, code: str
 ) -> None:
     own = late_by_two_bits()
-    most = figures(own).own["bus_load"] + 1e-5 if share < 1 else (responses(own)["fd"] or 0) - 0.1
+    most = figures(own).own.bus_load + 1e-5 if share < 1 else (responses(own)["fd"] or 0) - 0.1
     path = tmp_path / "own.toml"
     path.write_text(text_of(busplan.load_profile(own, changes={key: most})))
     answer = run("check", "--no-circle", str(path))

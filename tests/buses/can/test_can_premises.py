@@ -197,7 +197,7 @@ def test_a_response_with_repeated_frames_is_explained(name: str) -> None:
 
 
 def test_a_load_kept_by_exact_clocks_alone_is_not_shown() -> None:
-    load = figures(busplan.load_profile("can-servo-8")).own["bus_load"]
+    load = figures(busplan.load_profile("can-servo-8")).own.bus_load
     for share, verdict in ((0.0, "fits"), (0.005, "fits"), (0.0158, "not shown to fit")):
         changes = {"bus.clock_tolerance": share, "limits.max_load": 1.01 * load}
         assert figures(busplan.load_profile("can-servo-8", changes=changes)).verdict == verdict

@@ -41,7 +41,7 @@ def mixed(every: int = 4, **keys: Any) -> busplan.Profile:
 
 
 def load(own: busplan.Profile, model: str = WORST) -> float:
-    share: float = figures(own, model).own["bus_load"]
+    share: float = figures(own, model).own.bus_load
     return share
 
 

@@ -234,8 +234,8 @@ def test_so_many_frames_of_a_lower_priority_block(way: str, number: int) -> None
 def test_an_arm_of_eight_has_the_load_that_was_published() -> None:
     """enactic/openarm_ros2, issue 82: about 22 %, 8 bytes each way, 125 Hz, 1 Mbit/s."""
     profile = busplan.load_profile("can-motors-8")
-    assert figures(profile, "no-stuffing").own["bus_load"] == pytest.approx(0.222)
-    assert figures(profile).own["bus_load"] == pytest.approx(0.27)
+    assert figures(profile, "no-stuffing").own.bus_load == pytest.approx(0.222)
+    assert figures(profile).own.bus_load == pytest.approx(0.27)
     assert figures(profile).verdict == "fits"
 
 
@@ -244,12 +244,12 @@ def test_nine_motors_that_ran_at_1_khz_are_not_said_not_to_fit(way: str) -> None
     """enactic/openarm, issue 34: CAN FD at 1 and 5 Mbit/s, payload and times not said; here 8 bytes and none."""
     result = figures(loaded(Arm(9, way, data_rate=5000).data(1000)))
     assert result.verdict in ("fits", "not shown to fit")
-    assert result.own["bus_load"] == pytest.approx(0.99)
+    assert result.own.bus_load == pytest.approx(0.99)
 
 
 def test_no_load_is_too_large_where_the_cycle_fits_unless_the_profile_says_so() -> None:
     data = Arm(8, "burst").data(2200)
-    assert figures(loaded(data)).own["bus_load"] > 0.95
+    assert figures(loaded(data)).own.bus_load > 0.95
     assert figures(loaded(data)).exceeded == ()
     data["limits"] = {"max_load": 0.8}
     assert figures(loaded(data)).exceeded == ("load",)

@@ -254,7 +254,7 @@ def test_a_burst_waits_for_itself_and_others_wait_for_all_of_it() -> None:
         first["backlog_us"],
     ) == (270, 0, 4, 4 * 270)
     # Its period is the mean: the load is that of a frame in each of them.
-    assert figures(own).own["bus_load"] == pytest.approx(270 / 100_000 + 270 / 10_000 + 270 / 50_000)
+    assert figures(own).own.bus_load == pytest.approx(270 / 100_000 + 270 / 10_000 + 270 / 50_000)
 
 
 def test_the_deadline_of_a_burst_counts_from_when_it_is_queued() -> None:
@@ -307,7 +307,7 @@ def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
     swept = busplan.sweep(own, vary={f"message.m0.{key}": values}, timing_model=[WORST])
     for value, load, fits in zip(values, swept["bus_load"], swept["fits"], strict=True):
         alone = figures(busplan.load_profile(own, changes={f"message.m0.{key}": value}))
-        assert (load, fits) == (pytest.approx(alone.own["bus_load"]), alone.fits)
+        assert (load, fits) == (pytest.approx(alone.own.bus_load), alone.fits)
     assert len(set(swept["fits"])) > 1
 
 

@@ -116,7 +116,8 @@ def test_three_frames_in_a_cycle() -> None:
     )
     (result,) = busplan.capacity(plan, timing_model=["last-byte"]).results
     # 74 drives fill the first frame with 1480 bytes, 26 go with a camera, and the other camera has no room beside it.
-    assert (result.own["frames"], result.own["process_bytes"]) == (3, 100 * 20 + 2 * 900)
+    packed = busplan.EthercatFigures.of(result)
+    assert (packed.frames, packed.process_bytes) == (3, 100 * 20 + 2 * 900)
     last = 52 + 900
     sent = (3 * 52 + 3800) * BYTE_US
     assert result.required_us == pytest.approx(20 + sent + 102 * E_BUS_US)
@@ -234,7 +235,7 @@ def test_masters_lay_out_process_data_and_add_their_own_datagrams(
 def test_the_masters_datagrams_leave_the_first_frame_less_room() -> None:
     added = {"bus__housekeeping_bytes": [4, 4, 4, 2], "payload__write_bytes": 1}
     # 1486 bytes less 62 of datagrams: a device of 1424 has room beside them, one of 1425 has a frame of its own.
-    assert [of(profile(bus__nodes=1, payload__read_bytes=size, **added)).own["frames"] for size in (1424, 1425)] == [
+    assert [of(profile(bus__nodes=1, payload__read_bytes=size, **added)).own.frames for size in (1424, 1425)] == [
         1,
         2,
     ]
@@ -255,14 +256,14 @@ def test_the_masters_datagrams_leave_the_first_frame_less_room() -> None:
 )
 def test_a_command_must_be_taken_before_sync0(jitter_us: float, verdict: str, key: str | None) -> None:
     result = of(profile(bus__distributed_clocks=True, bus__master_jitter_us=jitter_us))
-    assert result.own["command_us"] == pytest.approx(jitter_us + 20 + (52 + 20 + 60) * BYTE_US + 3 * 0.1507 + 40)
-    assert result.own["sync0_us"] == 250
+    assert result.own.command_us == pytest.approx(jitter_us + 20 + (52 + 20 + 60) * BYTE_US + 3 * 0.1507 + 40)
+    assert result.own.sync0_us == 250
     assert result.verdict == verdict
     assert {name for name in ("exceeded", "not_shown") if getattr(result, name)} == ({key} if key else set())
     assert key is None or getattr(result, key) == ("sync0",)
     assert of(profile(bus__master_jitter_us=jitter_us)).verdict == "fits"
     late = of(profile(bus__distributed_clocks=True, bus__master_jitter_us=jitter_us, bus__sync_shift=0.0))
-    assert (late.verdict, late.own["sync0_us"]) == ("fits", 500)
+    assert (late.verdict, late.own.sync0_us) == ("fits", 500)
 
 
 def test_each_drive_has_its_own_window_about_sync0() -> None:
@@ -315,7 +316,7 @@ def test_the_smallest_period_keeps_commands_before_sync0() -> None:
     plan = profile(bus__distributed_clocks=True, bus__master_jitter_us=200.0, bus__sync_shift=0.25)
     result = of(plan)
     u_us = sqrt(20**2 / 3 + (3 * 0.0079) ** 2 + (60 * stdev(BYTE_COSTS_US) * sqrt(4 / 3)) ** 2 + 0.1**2 / 12)
-    taken_us = result.own["command_us"] + result.bias_us
+    taken_us = result.own.command_us + result.bias_us
     assert result.safe_min_period_us == pytest.approx((taken_us + 2 * u_us) / 0.25, rel=1e-9)
     assert result.min_period_us == pytest.approx(taken_us / 0.25, rel=1e-9)
     assert (

@@ -129,7 +129,7 @@ def test_frames_are_those_of_a_writer(groups: list[Sized], is_shared: bool, cloc
     frames = written(groups, is_shared=is_shared, clocks=clocks)
     result, vendors_us = results(plan)
     assert sent(plan) == frames
-    assert result.own["frames"] == len(frames)
+    assert result.own.frames == len(frames)
     sending = sum(frame.wire_bytes for frame in frames) * BYTE_US
     assert vendors_us["frames"] + vendors_us["data"] == pytest.approx(sending)
     assert vendors_us["receive"] == pytest.approx(frames[-1].wire_bytes * BYTE_US)
@@ -147,7 +147,7 @@ def test_a_sweep_and_a_derivation_have_what_each_number_of_devices_has(size: int
         changes = {key: swept[key][place].item() for key in ("group.g0.nodes", "group.g1.read_bytes")}
         (alone,) = busplan.capacity(busplan.load_profile(plan, changes=changes), timing_model=["vendors"]).results
         assert swept["required_us"][place] == pytest.approx(alone.required_us, rel=1e-12)
-        assert swept["frames"][place] == alone.own["frames"]
+        assert swept["frames"][place] == busplan.EthercatFigures.of(alone).frames
     explained = busplan.explain(plan, "required_us", timing_model=["vendors"]).derivations[0]
     assert explained.value == busplan.capacity(plan, timing_model=["vendors"]).results[0].required_us
 
@@ -188,4 +188,4 @@ def test_frames_of_many_devices_are_counted_and_not_listed() -> None:
     ).results
     # 92 devices have room in a frame, 91 beside the clocks, and 185 of the smaller ones.
     whole, left = divmod(10**6 - 91, 92)
-    assert result.own["frames"] == 1 + whole + -(-(10**6 + left * 2) // 185)
+    assert busplan.EthercatFigures.of(result).frames == 1 + whole + -(-(10**6 + left * 2) // 185)

@@ -131,7 +131,7 @@ def test_the_header_of_a_domain_takes_room_of_the_frame(size: int, frames: int) 
     # 1486 bytes of data with one header; the second header takes 12 of them.
     plan = profile([(1, 1, 1000, 0), (1, 1, size, 0)], starts=["", "datagram"])
     result = deciding(plan)
-    assert result.own["frames"] == frames
+    assert result.own.frames == frames
     drawn_us = sum(event.duration_us for event in busplan.timeline(plan).cycle_events if event.term)
     assert drawn_us == pytest.approx(result.required_us, rel=1e-12)
 
@@ -146,7 +146,7 @@ def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     each_us = written_us(groups, placed(groups, units), clocks=clocks, starts=starts)
     result = deciding(plan)
     assert result.required_us == pytest.approx(max(each_us), rel=1e-12)
-    assert result.own["mean_utilisation"] == pytest.approx(fmean(each_us) / 500, rel=1e-12)
+    assert result.own.mean_utilisation == pytest.approx(fmean(each_us) / 500, rel=1e-12)
     events = busplan.timeline(plan).cycle_events
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
 
@@ -233,7 +233,7 @@ def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -
     without = deciding(profile([(1, nodes, read, write) for _, nodes, read, write in groups]))
     result = deciding(profile(groups, units="together"))
     assert result.required_us == pytest.approx(without.required_us, rel=1e-12)
-    assert result.own["process_bytes"] == without.own["process_bytes"]
+    assert result.own.process_bytes == without.own.process_bytes
     assert result.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
 
 
@@ -249,7 +249,9 @@ def test_a_cycle_without_process_data_sends_no_frame() -> None:
     assert {event.kind for event in vendors.cycle_events} == {"master", "device", "idle"}
     assert vendors.required_us == last_byte.required_us == 20 + E_BUS_US
     (result,) = busplan.capacity(plan, timing_model=["vendors"]).results
-    assert result.own["mean_utilisation"] == pytest.approx((result.required_us + vendors.required_us) / 2 / 500)
+    assert busplan.EthercatFigures.of(result).mean_utilisation == pytest.approx(
+        (result.required_us + vendors.required_us) / 2 / 500
+    )
 
 
 def test_a_cycle_without_process_data_has_the_masters_datagrams_alone() -> None:
@@ -261,7 +263,7 @@ def test_a_cycle_without_process_data_has_the_masters_datagrams_alone() -> None:
     drawn_us = sum(event.duration_us for event in empty_us.cycle_events if event.term)
     assert drawn_us == pytest.approx(empty_us.required_us)
     mean_us = (filled_us.required_us + empty_us.required_us) / 2
-    assert deciding(plan).own["mean_utilisation"] == pytest.approx(mean_us / 500)
+    assert deciding(plan).own.mean_utilisation == pytest.approx(mean_us / 500)
 
 
 @given(st.lists(st.integers(1, 100), min_size=2, max_size=5), st.integers(2, 4))
@@ -291,11 +293,11 @@ def test_a_rate_of_1_is_what_no_rate_is() -> None:
         del group["every"]
     del data["bus"]["units"]
     assert deciding(plan).by_key() == deciding(kind_named("ethercat").profile_model().model_validate(data)).by_key()
-    assert deciding(plan).own["mean_utilisation"] == deciding(plan).utilisation
+    assert deciding(plan).own.mean_utilisation == deciding(plan).utilisation
 
 
 def test_neighbours_with_the_same_keys_have_cycles_of_their_own() -> None:
-    assert deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).own["process_bytes"] == 20 * 60
+    assert deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).own.process_bytes == 20 * 60
 
 
 def test_a_sweep_has_what_each_profile_has() -> None:

@@ -199,7 +199,7 @@ def test_can_says_its_load_and_the_message_closest_to_its_deadline(
     answer = busplan.capacity(profile)
     figures: Any = answer.verdicts[0].deciding
     _, lines = card_of(answer)
-    assert lines["load"] == f"{100 * figures.own['bus_load']:.1f} %, 80 allowed".replace(".0 ", " ")
+    assert lines["load"] == f"{100 * figures.own.bus_load:.1f} %, 80 allowed".replace(".0 ", " ")
     phases: dict[str, Any] = {
         row.transaction: row.phases
         for row in busplan.latency(profile, timing_model="worst-stuffing").transactions

@@ -184,7 +184,7 @@ def test_the_smallest_period_of_a_limit_is_exact() -> None:
     frames_us = 2 * 2 * (135 + 95) + 55
     one = on_kind(changed("paper-1ms", cycle__slice_ratio=1.0), "can")
     assert one.smallest.us == pytest.approx(frames_us / 0.8, rel=1e-9)
-    assert one.figures.own["bus_load"] == pytest.approx(frames_us / 1000, rel=1e-9)
+    assert busplan.CanFigures.of(one.figures).bus_load == pytest.approx(frames_us / 1000, rel=1e-9)
     # Whatever share of the period is for communication.
     half = changed(one.profile, cycle__slice_ratio=0.5, limits__max_load=0.1)
     assert on_kind(half).smallest.us == pytest.approx(frames_us / 0.1, rel=1e-9)

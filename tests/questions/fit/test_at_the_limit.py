@@ -35,7 +35,7 @@ def test_a_plan_takes_the_period_at_which_the_share_is_used_exactly(name: str, p
 def test_a_plan_takes_the_period_at_which_the_load_is_reached_exactly(period_us: float) -> None:
     own = busplan.load_profile("can-servo-8", changes={"cycle.period_us": period_us})
     (figures,) = busplan.capacity(own, timing_model="worst-stuffing").results
-    limits = {"limits": {"max_load": figures.own["bus_load"]}}
+    limits = {"limits": {"max_load": busplan.CanFigures.of(figures).bus_load}}
     assert least_period_us(busplan.load_profile(own, changes=limits)) == period_us
 
 
@@ -53,7 +53,7 @@ def test_a_period_at_its_limit_allows_for_rounding_and_no_more() -> None:
 
 def test_a_load_at_its_limit_allows_for_rounding_and_no_more() -> None:
     profile = busplan.load_profile("can-servo-8")
-    load = busplan.capacity(profile, timing_model="worst-stuffing").results[0].own["bus_load"]
+    load = busplan.CanFigures.of(busplan.capacity(profile, timing_model="worst-stuffing").results[0]).bus_load
     assert isinstance(load, float)
     for most, is_broken in ((load, False), (nextafter(load, 0), False), (load * (1 - 3e-11), True)):
         limited = busplan.load_profile(profile, changes={"limits": {"max_load": most}})

@@ -2,7 +2,9 @@
 
 from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import fields
 from math import fsum
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named, kind_names
+from busplan.buses.figure import by_key
 from busplan.elementwise import Traced
 from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
@@ -23,6 +26,21 @@ KINDS = pytest.mark.parametrize("kind", kind_names())
 SOME = settings(max_examples=10)  # of each kind
 PLACES = st.lists(st.integers(2, 68), min_size=4, max_size=4).map(lambda places: {0, 1, *places})
 """Some of an array, the first two always."""
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_the_record_of_a_kind_has_the_keys_of_its_figures_and_values_of_its_types(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    for found in busplan.capacity(profile).results:
+        types, register = get_type_hints(type(found.own)), found.bus_figures
+        keys = {figure.key for figure in (*register.capacity, *register.compared)} - {one.name for one in fields(found)}
+        assert set(types) == keys - (set() if profile.has_cycle else {*by_key(register.terms)})
+        for key, type_ in types.items():
+            assert isinstance(getattr(found.own, key), type_ | int if isinstance(0.0, type_) else type_), key
 
 
 @KINDS

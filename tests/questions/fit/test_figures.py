@@ -82,7 +82,9 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     profile = data.draw(any_profile)
     figures = data.draw(st.sampled_from(busplan.capacity(profile).results))
     assert fsum(term.us for term in figures.terms) == pytest.approx(figures.required_us, rel=1e-12)
-    assert {term.key: figures.own[term.key] for term in figures.terms} == {term.key: term.us for term in figures.terms}
+    assert {term.key: getattr(figures.own, term.key) for term in figures.terms} == {
+        term.key: term.us for term in figures.terms
+    }
     assert figures.required_time_slice_us * figures.nodes == pytest.approx(figures.required_us, rel=1e-13)
     values = figures.values()
     assert figures.max_nodes is not None
@@ -220,8 +222,8 @@ def test_a_period_too_short_for_anything_carries_no_node(make: Make) -> None:
 
 def test_optimal_gap_count_follows_the_chain(make: Make) -> None:
     three, ten = (only(make(bus__gap_count="optimal", bus__nodes=nodes)) for nodes in (3, 10))
-    assert (three.own["gap_count"], ten.own["gap_count"]) == (8, 26)
-    assert (three.own["safe_gap_count"], three.safe, ten.safe) == (8, True, True)
+    assert (three.own.gap_count, ten.own.gap_count) == (8, 26)
+    assert (three.own.safe_gap_count, three.safe, ten.safe) == (8, True, True)
 
 
 def test_the_paper_promises_half_as_many_nodes_again(make: Make) -> None:
@@ -255,3 +257,9 @@ def test_equation_11_as_published_at_the_profiles_own_nodes(make: Make) -> None:
     by_hand = (figures["available_us"] - 0.4) / (2 * (figures["read_latency_us"] + figures["gaps_us"]))
     assert figures["read_latency_us"] == figures["write_latency_us"]
     assert figures["nodes_eq11"] == pytest.approx(by_hand, rel=1e-14)
+
+
+def test_figures_of_another_kind_are_refused() -> None:
+    (result, *_) = busplan.capacity("paper-4ms").results
+    with pytest.raises(busplan.BusplanError, match="the figures are Ieee1394Figures, not CanFigures"):
+        busplan.CanFigures.of(result)

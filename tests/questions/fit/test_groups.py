@@ -224,7 +224,7 @@ def test_the_figures_of_the_gantry_by_hand() -> None:
     gantry = figures(GANTRY)
     (term,) = (term for term in gantry.terms if term.name == "execution")
     assert term.us == pytest.approx(4 * 2 * between_us(40) + between_us(36) + 45.4 + (5 + 0.8))
-    assert (gantry.nodes, gantry.axes, gantry.own["hops"]) == (6, 24, 6)
+    assert (gantry.nodes, gantry.axes, busplan.Ieee1394Figures.of(gantry).hops) == (6, 24, 6)
 
 
 def test_set_points_of_the_circle_arrive_at_nodes_with_axes() -> None:
@@ -288,7 +288,7 @@ def test_a_tree_charges_the_hops_of_its_groups(tmp_path: Path) -> None:
         text = text.replace(axes, f"{axes}\nhops = 2", 1)
     tree = read(text, tmp_path)
     assert {transaction.phases["hops"] for transaction in busplan.latency(tree).transactions} == {2}
-    assert figures(tree).own["hops"] == 3
+    assert busplan.Ieee1394Figures.of(figures(tree)).hops == 3
 
 
 @given(profile=grouped())

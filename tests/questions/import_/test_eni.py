@@ -254,7 +254,7 @@ def test_devices_of_a_slower_task_go_in_every_nth_cycle(tmp_path: Path) -> None:
     fast, slow = 40 + 14 + 12 + 6, 40 + 12 + 100
     assert frames_us(profile) == pytest.approx((max(fast, 84) + slow) * 0.08)
     deciding = busplan.capacity(profile).verdicts[0].deciding
-    mean = deciding.own["mean_utilisation"]
+    mean = busplan.EthercatFigures.of(deciding).mean_utilisation
     assert isinstance(mean, float)
     assert mean < deciding.utilisation
     assert not any("further task" in remark for remark in answer.remarks)

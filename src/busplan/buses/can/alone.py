@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from math import inf
-from typing import Final, Literal, Self
+from typing import ClassVar, Final, Literal, Self
 
-from busplan.buses.can.equations import TERMS, c
+from busplan.buses.can.equations import TERMS, CanMessageFigures, c
 from busplan.buses.can.latency import phases
 from busplan.buses.can.traffic import NO_DEADLINE_US, NOT_BY_PRIORITY, REPEATED, Message, Traffic, traffic_of
 from busplan.buses.can.waiting import message_responses
@@ -45,6 +45,7 @@ class CanCycle(BusCycle):
     """What every CAN network has, with and without a cycle: loads, and response times of messages."""
 
     term_figures = TERMS
+    record: ClassVar[type[CanMessageFigures]] = CanMessageFigures
 
     def __init__(
         self, network: Network, model: str, number: int | None = None, *, traffic: Traffic | None = None

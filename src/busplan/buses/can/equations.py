@@ -1,10 +1,11 @@
 """CAN frames in equations: sourced constants, lengths and times of frames, and the figures made of them."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.buses.figure import BusFigures, read_figures
+from busplan.buses.figure import BusFigures, OwnFigures, read_figures
 from busplan.elementwise import Number, choose, is_off, larger, next_entry, rounded_down, rounded_up, smaller
 from busplan.sourced import Constants
 
@@ -224,3 +225,27 @@ FIGURES: Final = BusFigures(
     has_many_transactions=True,
     deadlines=("worst_response_us", "deadline_us"),
 )
+
+
+@dataclass(frozen=True)
+class CanMessageFigures(OwnFigures):
+    """Figures of a CAN network of messages alone, by the keys of `FIGURES`."""
+
+    bit_rate_kbit_s: float
+    bus_load: float
+    expected_load: float
+
+
+@dataclass(frozen=True)
+class CanFigures(CanMessageFigures):
+    """Figures of a CAN network with a cycle: those of its messages, and its terms."""
+
+    cycle_jitter_us: float
+    cycle_sync_us: float
+    cycle_wait_us: float
+    cycle_feedback_us: float
+    cycle_host_us: float
+    cycle_command_us: float
+    cycle_blocking_us: float
+    cycle_interference_us: float
+    nonperiodic_us: float

@@ -9,7 +9,7 @@ from math import inf
 from typing import ClassVar, Self
 
 from busplan.buses.can.alone import CanCycle
-from busplan.buses.can.equations import TERMS, bit_us, payload_us
+from busplan.buses.can.equations import TERMS, CanFigures, bit_us, payload_us
 from busplan.buses.can.latency import numbered
 from busplan.buses.can.streams import frame_sizes, last_identifier, place, repeated, streams
 from busplan.buses.can.traffic import LOOP, NAMES, REPEATED, Message, Pdos, Traffic
@@ -37,6 +37,7 @@ from busplan.sections.base import TransactionKind
 class PdoCycle(CanCycle):
     """A cycle of feedback and command PDOs, in which other messages come as late for the commands as they can."""
 
+    record = CanFigures
     command_events = (("command", "command_frame"),)
     executions: ClassVar[tuple[TransactionKind, ...]]
     """Executions that the cycle waits for, one after the other."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, reduce
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, cast
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, Premise, Run
 from busplan.buses.ethercat.equations import (
@@ -10,6 +10,7 @@ from busplan.buses.ethercat.equations import (
     LATENCY_TABLE,
     MEAN,
     TERMS,
+    EthercatFigures,
     c,
     cable_us,
     frame_bytes,
@@ -39,6 +40,9 @@ from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network, Rate
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, step, total
+
+if TYPE_CHECKING:
+    from busplan.buses.ethercat.section import EthercatBus
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
@@ -89,10 +93,13 @@ class EthercatCycle(BusCycle):
     """The master's time and jitter, frames, devices and cables there and back, and the non-periodic window."""
 
     term_figures = TERMS
+    record = EthercatFigures
     premises = PREMISES
 
     def __init__(self, network: Network, model: str, number: int | None = None) -> None:
         self.network = network
+        self.bus = cast("EthercatBus", network.profile.bus)
+        """Section [bus] of the profile."""
         self.model = model
         self.number = number
         self.counts_reception = model == VENDORS
@@ -139,7 +146,7 @@ class EthercatCycle(BusCycle):
             return 0.0
         is_empty = self.number is not None and not self.packing.frames
         last_us = 0.0 if is_empty else sending_us(frame_bytes(self.packing.last_bytes))
-        return choose(self.network.profile.bus.mailbox_polls > 0, mailbox_frame_us(self.network), last_us)
+        return choose(self.bus.mailbox_polls > 0, mailbox_frame_us(self.network), last_us)
 
     @property
     def most_required_us(self) -> Number:
@@ -150,14 +157,14 @@ class EthercatCycle(BusCycle):
             sending_us(frame_bytes(datagrams_bytes))
             for datagrams_bytes in (self.packing.last_bytes, self.packing.before_bytes)
         )
-        polls = self.network.profile.bus.mailbox_polls
+        polls = self.bus.mailbox_polls
         # Without that frame its sending and reception do not count; the reception of the frame before does.
         lost_us = choose(self.packing.before_bytes > 0, larger(before_us - 2 * last_us, 0.0), 0.0)
         return self.required_us + choose(polls > 0, 0.0, lost_us)
 
     def written(self) -> Iterator[BusEvent | Run]:
         """The master, its frames, the last byte through all devices and back, and the non-periodic window."""
-        bus = self.network.profile.bus
+        bus = self.bus
         yield BusEvent("master", "cycle_master_us", bus.master_us, "master", rests_on="bus.master_us")
         late_us, late = bus.master_jitter_us, "latest start of the frames"
         yield BusEvent("jitter", "cycle_jitter_us", late_us, late, rests_on="bus.master_jitter_us")
@@ -181,7 +188,7 @@ class EthercatCycle(BusCycle):
         """Doubts of the devices' delays, of the master's own time, and of the time of bytes beyond the wire."""
         return (
             *devices_doubts(self.network),
-            Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
+            Doubt("bus.master_us", "the master's own time", self.bus.master_doubt_us),
             Doubt("bytes", "time of a byte beyond the wire", self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US),
         )
 
@@ -220,12 +227,11 @@ class EthercatCycle(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """Frames, process data, time of the last command, time of SYNC0, and the mean load."""
-        has_clocks = self.network.profile.bus.distributed_clocks
         return {
             "frames": self.packing.frames,
             "process_bytes": self.process_bytes,
             "command_us": self.last_command_us,
-            "sync0_us": sync0_us(self.network) if has_clocks else None,
+            "sync0_us": sync0_us(self.network) if self.bus.distributed_clocks else None,
             MEAN.key: self._mean_us / self._given_us,
         }
 
@@ -322,7 +328,7 @@ class EthercatCycle(BusCycle):
         """Standard uncertainty of `last_command_us`: master, devices one way, bytes and slowest execution [us]."""
         execution_us = reduce(larger, (group.write_uncertainty_us for group in self.network.groups))
         parts = (
-            self.network.profile.bus.master_doubt_us,
+            self.bus.master_doubt_us,
             *(doubt.us / 2 for doubt in devices_doubts(self.network)),
             self.process_bytes * c.BYTE_BIAS_UNCERTAINTY_US,
             execution_us,
@@ -343,13 +349,13 @@ class EthercatCycle(BusCycle):
     @step("t_cmd", "command_us")
     def _taken_us(self, group: Group) -> Number:
         """Latest time at which a group has taken its command, as if it stood at the end of the segment [us]."""
-        bus = self.network.profile.bus
+        bus = self.bus
         on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
         return on_wire_us + group.write_execution_us + group.worst_extra_us
 
     def _command(self, group: Group) -> dict[str, Number]:
         """Phases of a command, from the cycle with the feedback it is computed from to its effect [us]."""
-        network, bus = self.network, self.network.profile.bus
+        network, bus = self.network, self.bus
         taken_us = self._taken_us(group)
         wait_us: Number = 0.0
         if bus.distributed_clocks:
@@ -368,7 +374,7 @@ class EthercatCycle(BusCycle):
 
     def _feedback(self, group: Group) -> dict[str, Number]:
         """Phases of feedback, from the sample through the wait for a frame until the master has all frames [us]."""
-        network, bus = self.network, self.network.profile.bus
+        network, bus = self.network, self.bus
         ready_us = group.read_execution_us + group.worst_extra_us
         ready_at_us = sync0_us(network) + ready_us
         period_us = _period_us(group, network)

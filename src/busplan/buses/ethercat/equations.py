@@ -4,10 +4,11 @@ Each parameter is a float or an array, and so is the result.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.buses.figure import BusFigures, read_figures
+from busplan.buses.figure import BusFigures, OwnFigures, read_figures
 from busplan.buses.published import Spread, data_file, rows_of
 from busplan.elementwise import Number, choose, larger
 from busplan.sourced import Constants
@@ -146,3 +147,23 @@ FIGURES: Final = BusFigures(
     latency_rows=LATENCY_TABLE,
     has_many_transactions=True,
 )
+
+
+@dataclass(frozen=True)
+class EthercatFigures(OwnFigures):
+    """Figures of EtherCAT alone, by the keys of `FIGURES`."""
+
+    frames: int
+    process_bytes: int
+    command_us: float
+    sync0_us: float | None
+    mean_utilisation: float
+    cycle_master_us: float
+    cycle_jitter_us: float
+    cycle_frames_us: float
+    cycle_data_us: float
+    cycle_mailbox_us: float
+    cycle_devices_us: float
+    cycle_cable_us: float
+    cycle_receive_us: float
+    nonperiodic_us: float

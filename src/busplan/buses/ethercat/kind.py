@@ -18,6 +18,7 @@ from busplan.buses.ethercat.equations import (
     FIGURES,
     SEPARATE,
     SHARED,
+    EthercatFigures,
     c,
     room_bytes,
 )
@@ -164,7 +165,8 @@ def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     figures = subject.deciding
     if BeforeSync0.key not in (*figures.exceeded, *(figures.not_shown or ())):
         return
-    late = max(ceil((figures.own["command_us"] - figures.own["sync0_us"]) / figures.period_us), 1)
+    own = EthercatFigures.of(figures)
+    late = max(ceil((own.command_us - (own.sync0_us or 0.0)) / figures.period_us), 1)
     maybe = "" if BeforeSync0.key in figures.exceeded else "maybe "
     yield RuleProblem(
         "bus.sync_shift",

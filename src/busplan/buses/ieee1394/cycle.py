@@ -14,7 +14,7 @@ from busplan.buses.ieee1394.constants import (
     c,
 )
 from busplan.buses.ieee1394.doubts import ACKNOWLEDGED, UNACKNOWLEDGED
-from busplan.buses.ieee1394.figures import LATENCY, READS, SYNC, TERMS, WRITES
+from busplan.buses.ieee1394.figures import LATENCY, READS, SYNC, TERMS, WRITES, Ieee1394Figures
 from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import (
     Exchange,
@@ -91,6 +91,7 @@ class CycleWithStarts(BusCycle):
     """
 
     term_figures = TERMS
+    record = Ieee1394Figures
     premises = PREMISES
     command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     model: TimingModelName

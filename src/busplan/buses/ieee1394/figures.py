@@ -1,5 +1,6 @@
 """Figures of IEEE 1394: settings of the bus, terms of the cycle, latencies and the phases of a transaction."""
 
+from dataclasses import dataclass
 from itertools import chain
 from typing import Final
 
@@ -12,6 +13,7 @@ from busplan.buses.figure import (
     BusFigures,
     Figure,
     Ink,
+    OwnFigures,
     by,
 )
 from busplan.buses.ieee1394 import equations as eq
@@ -226,3 +228,37 @@ FIGURES: Final = BusFigures(
     latency_main="transaction_us",
     latency_document=LATENCY,
 )
+
+
+@dataclass(frozen=True)
+class Ieee1394Figures(OwnFigures):
+    """Figures of IEEE 1394 alone, by the keys of `FIGURES`."""
+
+    hops: int
+    gap_count: int
+    safe_gap_count: int
+    gap_count_safe: bool
+    read_latency_us: float
+    write_latency_us: float
+    read_latency_with_gaps_us: float
+    write_latency_with_gaps_us: float
+    read_transaction_us: float
+    write_transaction_us: float
+    gaps_us: float
+    subaction_gap_us: float
+    arbitration_reset_gap_us: float
+    reads_us: float
+    writes_us: float
+    nodes_eq11: float | None
+    cycle_starts_us: float
+    sync_us: float
+    cycle_arbitration_us: float
+    cycle_data_us: float
+    cycle_acknowledge_us: float
+    cycle_hold_us: float
+    cycle_execution_us: float
+    cycle_worst_extra_us: float
+    cycle_idle_us: float
+    cycle_host_us: float
+    retries_us: float
+    nonperiodic_us: float

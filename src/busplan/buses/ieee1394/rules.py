@@ -16,6 +16,7 @@ from busplan.buses.ieee1394.constants import (
     padded_bytes,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.figures import Ieee1394Figures
 from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
 from busplan.buses.limits import ExactLimit, Limit, nodes_limit
 from busplan.buses.network import Network
@@ -154,13 +155,13 @@ def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
 def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Problem where the plan needs a gap count that a bus reset undoes."""
     figures = subject.deciding
-    if figures.verdict == "fits" and figures.own["gap_count"] < MAX_GAP_COUNT:
+    own = Ieee1394Figures.of(figures)
+    if figures.verdict == "fits" and own.gap_count < MAX_GAP_COUNT:
         after = subject.after({"bus.gap_count": MAX_GAP_COUNT})
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits at {figures.own['gap_count']}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: "
-                f"{margin(after)}",
+                f"fits at {own.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
                 "have the bus manager write the gap count after each reset",
             )
 
@@ -211,7 +212,7 @@ def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Problem where the gap count is below the table."""
-    if not subject.deciding.own["gap_count_safe"]:
+    if not Ieee1394Figures.of(subject.deciding).gap_count_safe:
         yield RuleProblem("bus.gap_count", subject.limit_words("gap table"), *subject.cure())
 
 
@@ -220,7 +221,8 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     figures = subject.deciding
     if "cycle starts" in figures.exceeded:
         return  # No time is left, so none can be saved.
-    if figures.own["gap_count"] > figures.own["safe_gap_count"] and _bus(subject).cable_is_standard:
+    own = Ieee1394Figures.of(figures)
+    if own.gap_count > own.safe_gap_count and _bus(subject).cable_is_standard:
         yield RuleProblem("bus.gap_count", partial(_wasted, subject))
 
 
@@ -229,8 +231,9 @@ def _wasted(subject: RuleSubject) -> str:
     changes = {"bus.gap_count": "optimal"}
     figures, after = subject.deciding, subject.after(changes)
     saved, _ = told_apart(figures.required_us - after.required_us, 0.0)
-    safe = figures.own["safe_gap_count"]
-    above = f"gap count {figures.own['gap_count']} is above the {safe} that {figures.own['hops']} hops need"
+    own = Ieee1394Figures.of(figures)
+    safe = own.safe_gap_count
+    above = f"gap count {own.gap_count} is above the {safe} that {own.hops} hops need"
     words = f"{above}; {safe} saves {saved} us a cycle"
     if subject.profile.group:
         return words

@@ -1,17 +1,21 @@
 """The cycle of a polled bus: request, turn-around and answer of each node."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, cast
 
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise, Run
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.polled.protocols import ProtocolFigures, Requests, Times, c, protocol_of, times
 from busplan.elementwise import Number, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 from busplan.sections.cycle import time_uncertainty_us
+
+if TYPE_CHECKING:
+    from busplan.buses.polled.section import PolledBus
 
 TimingModelName = Literal["standard", "typical"]
 STANDARD: Final[TimingModelName] = "standard"
@@ -61,6 +65,25 @@ _BY_CLOCK: Final = (
 )
 """Terms timed by the clocks of the bit rate; of the turn-around they time all but the nodes' own time."""
 FIGURES: Final = BusFigures(TERMS, setup=(RATE,), headings=(RATE.key,))
+
+
+@dataclass(frozen=True)
+class PolledFigures(OwnFigures):
+    """Figures of polled buses alone, by the keys of `FIGURES`."""
+
+    bit_rate_kbit_s: float
+    cycle_once_us: float
+    cycle_global_us: float
+    cycle_request_us: float
+    cycle_turn_us: float
+    cycle_answer_us: float
+    cycle_gap_us: float
+    cycle_adapter_us: float
+    cycle_retry_us: float
+    cycle_host_us: float
+    nonperiodic_us: float
+
+
 EVENTS: Final = (
     EventKind("once", "token and GAP", _WIRE, "t", "sync"),
     EventKind("global", "global control", _WIRE, "s", "sync"),
@@ -95,16 +118,19 @@ class PolledCycle(BusCycle):
     """All feedback, then all commands; or an exchange with each node in turn."""
 
     term_figures = TERMS
+    record = PolledFigures
     premises = PREMISES
     command_events = (("exchange", "request"), ("write", "request"))
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
+        self.bus = cast("PolledBus", network.profile.bus)
+        """Section [bus] of the profile."""
         self.is_typical = model == TYPICAL
 
     @property
     def _protocol(self) -> ProtocolFigures:
-        return protocol_of(self.network.profile.bus)
+        return protocol_of(self.bus)
 
     @cached_property
     def _times(self) -> Times:
@@ -113,8 +139,7 @@ class PolledCycle(BusCycle):
     @property
     def way(self) -> Requests:
         """The way that nodes are asked."""
-        way: Requests = self.network.profile.bus.requests or self._protocol.requests[0]
-        return way
+        return self.bus.requests or self._protocol.requests[0]
 
     @cached_property
     def _turn_us(self) -> Number:
@@ -126,17 +151,16 @@ class PolledCycle(BusCycle):
     @property
     def _clock_tolerance(self) -> Number:
         """Largest error of the bit rate, as a share of it [1]."""
-        given: Number | None = self.network.profile.bus.clock_tolerance
+        given = self.bus.clock_tolerance
         return self._protocol.clock_tolerance if given is None else given
 
     def _wire_us(self, size: Number) -> Number:
         """Time of a telegram of `size` bytes [us]."""
-        us: Number = size * self._protocol.bits_per_byte * 1000 / self.network.profile.bus.bit_rate_kbit_s
-        return us
+        return size * self._protocol.bits_per_byte * 1000 / self.bus.bit_rate_kbit_s
 
     def written(self) -> Iterator[BusEvent | Run]:
         """Token, broadcast, reads, the host, writes, repeated requests, and the non-periodic window."""
-        bus, groups = self.network.profile.bus, tuple(enumerate(self.network.groups))
+        bus, groups = self.bus, tuple(enumerate(self.network.groups))
         yield BusEvent("once", "cycle_once_us", self._times.once, "token and GAP")
         if bus.global_control:
             idle_us = self._times.before + self._times.silent
@@ -158,7 +182,7 @@ class PolledCycle(BusCycle):
     @property
     def _retry_us(self) -> Number:
         """Time of repeated requests: the longest kind of request, without an answer, each with its timeout [us]."""
-        retries: Number = self.network.profile.bus.retries
+        retries: Number = self.bus.retries
         if is_off(retries):
             return 0.0
         longest_us = reduce(larger, map(self._longest_us, self.network.groups))
@@ -174,9 +198,7 @@ class PolledCycle(BusCycle):
         return self._wire_us(larger(protocol.read_request_bytes, written))
 
     def _times_a_cycle(self, kind: TransactionKind) -> Number:
-        bus = self.network.profile.bus
-        times_a_cycle: Number = bus.reads if kind == "read" else bus.writes
-        return times_a_cycle
+        return self.bus.reads if kind == "read" else self.bus.writes
 
     def _data(self, kind: TransactionKind, group: Group) -> Number:
         """Mean data of a request of a node [bytes]."""
@@ -200,7 +222,7 @@ class PolledCycle(BusCycle):
 
     def _around(self, kind: str, *inner: BusEvent, is_answered: bool) -> tuple[BusEvent, ...]:
         """A request with the idle times before and after it, and the adapter."""
-        adapter_us = self.network.profile.bus.adapter_us if is_answered else 0.0
+        adapter_us = self.bus.adapter_us if is_answered else 0.0
         after_us = self._times.after if is_answered else self._times.silent
         return (
             BusEvent("gap", "cycle_gap_us", self._times.before, "idle time before a request", transaction=kind),
@@ -266,7 +288,7 @@ class PolledCycle(BusCycle):
                 "bus.adapter_us", "adapter of the host", self.by_term["cycle_adapter_us"] * c["SHARES[ADAPTER_SHARE]"]
             ),
         ]
-        host_us: Number = time_uncertainty_us(self.network.profile.bus.host_us, is_guess=False)
+        host_us: Number = time_uncertainty_us(self.bus.host_us, is_guess=False)
         doubts.append(Doubt("bus.host_us", "the host's own time", host_us))
         if not self._protocol.is_buffered:
             execution_us: list[Number] = []
@@ -283,7 +305,7 @@ class PolledCycle(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate."""
-        return {RATE.key: self.network.profile.bus.bit_rate_kbit_s}
+        return {RATE.key: self.bus.bit_rate_kbit_s}
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """Periods inside a loop [1]: one more in an exchange, whose command uses the last cycle's feedback."""

@@ -1,11 +1,12 @@
 """SERCOS I and II: sourced figures, lengths of telegrams, and the cycle."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, Premise, Run
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import EventKind, Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos.shared import DELAYS, SercosCycle, delays, word_bytes
@@ -97,6 +98,20 @@ FIGURES: Final = BusFigures(
 )
 
 
+@dataclass(frozen=True)
+class Sercos2Figures(OwnFigures):
+    """Figures of SERCOS I and II alone, by the keys of `FIGURES`."""
+
+    data_rate_mbit_s: float
+    mdt_bytes: float
+    cycle_mst_us: float
+    cycle_at_us: float
+    cycle_gap_us: float
+    cycle_mdt_us: float
+    cycle_wait_us: float
+    nonperiodic_us: float
+
+
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
@@ -134,6 +149,7 @@ class Sercos2Cycle(SercosCycle):
     """MST, t1, an AT of each drive with gaps between them, t_ATMT, the MDT, and the drives' recovery."""
 
     term_figures = TERMS
+    record = Sercos2Figures
     premises = PREMISES
 
     def __init__(self, network: Network, model: str) -> None:

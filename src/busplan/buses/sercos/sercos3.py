@@ -1,10 +1,11 @@
 """SERCOS III: sourced figures, and its telegrams."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from math import sqrt
 from typing import Final, Literal, NamedTuple
 
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos.shared import DELAYS, word_bytes
@@ -194,6 +195,21 @@ FIGURES: Final = BusFigures(
     planned=tuple(figure.key for figure in COUNTS),
     latency_rows=DELAYS,
 )
+
+
+@dataclass(frozen=True)
+class Sercos3Figures(OwnFigures):
+    """Figures of SERCOS III alone, by the keys of `FIGURES`."""
+
+    mdt_telegrams: int
+    at_telegrams: int
+    cycle_mdt_us: float
+    cycle_wait_us: float
+    cycle_at_us: float
+    cycle_jitter_us: float
+    cycle_master_us: float
+    cycle_ring_us: float
+    nonperiodic_us: float
 
 
 SORTS: Final[dict[TransactionKind, str]] = {"write": "mdt", "read": "at"}

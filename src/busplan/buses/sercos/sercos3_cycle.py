@@ -13,6 +13,7 @@ from busplan.buses.sercos.sercos3 import (
     SORTS,
     TERMS,
     Filling,
+    Sercos3Figures,
     Telegrams,
     c,
     padded_bytes,
@@ -68,6 +69,7 @@ class Sercos3Cycle(SercosCycle):
     """
 
     term_figures = TERMS
+    record = Sercos3Figures
     premises = PREMISES
 
     def __init__(self, network: Network, model: str) -> None:

@@ -8,7 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.figure import BusFigures
+from busplan.buses.figure import BusFigures, OwnFigures
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Held, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
@@ -262,8 +262,8 @@ class FitFigures:
     """Components of the uncertainty; empty under a timing model that does not decide."""
     safe: bool
     """Whether every safety limit of the bus is kept, such as a gap count that is safe for the hops."""
-    own: Mapping[str, float | str | None]
-    """Figures and terms that only this kind of bus has, by key."""
+    own: OwnFigures
+    """Figures and terms that only this kind of bus has: the record of the kind, such as `Ieee1394Figures`."""
 
     @property
     def behind(self) -> tuple[str, ...]:
@@ -272,8 +272,11 @@ class FitFigures:
         return tuple(key for key in keys if key != TIME)
 
     def values(self) -> dict[str, Any]:
-        """All figures by the keys of their `Figure`s, whether every bus has them or only this kind."""
-        return {**self.own, **vars(self)}
+        """All figures by the keys of their `Figure`s, whether every bus has them or only this kind.
+
+        The terms of a network of messages alone are None.
+        """
+        return {**dict.fromkeys(term.key for term in self.bus_figures.terms), **vars(self.own), **vars(self)}
 
 
 @dataclass(frozen=True)
@@ -393,7 +396,8 @@ class FitNumbers(NamedTuple):
     numbers: Mapping[str, Number | None]
     """Figures that every kind of bus has, by key; None for one that the timing model does not have."""
     own: Mapping[str, Number | None]
-    """Figures and terms that only this kind of bus has, by key."""
+    """Figures and terms that only this kind of bus has, by the names of the fields of `record`."""
+    record: type[OwnFigures]
     terms: tuple[Term, ...]
     doubts: tuple[Doubt, ...]
     codes: Mapping[str, Number]
@@ -431,6 +435,7 @@ class FitNumbers(NamedTuple):
                 self.model,
                 numbers,
                 own,
+                self.record,
                 tuple(term._replace(us=us) for term, us in zip(self.terms, terms_us, strict=True)),
                 tuple(doubt._replace(us=us) for doubt, us in zip(self.doubts, doubts_us, strict=True)),
                 codes,
@@ -457,7 +462,7 @@ class FitNumbers(NamedTuple):
             exceeded=exceeded,
             fits=not exceeded,
             safe=not self.unsafe,
-            own=_plain_or_none(self.own),
+            own=self.record(**_plain_or_none(self.own)),
         )
 
 
@@ -480,10 +485,11 @@ def fit_numbers(network: Network, *, model: str) -> FitNumbers:
         numbers |= certainty_numbers(certain, cycle)
     else:
         numbers |= dict.fromkeys(_CERTAINTY_KEYS)
-    own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
-    own |= {term.key: term.us for term in terms}
+    own = {**cycle.figures(), **{term.key: term.us for term in terms}}
     unsafe = total(limit.is_surely_broken(network) for limit in bus.limits if limit.role == "safety") > 0
-    return FitNumbers(bus.kind, bus.figures, bus.safety, model, numbers, own, terms, doubts, codes, broken, unsafe)
+    return FitNumbers(
+        bus.kind, bus.figures, bus.safety, model, numbers, own, cycle.record, terms, doubts, codes, broken, unsafe
+    )
 
 
 def _plain_or_none(numbers: Mapping[str, Number | None]) -> dict[str, Any]:

@@ -200,7 +200,7 @@ def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
     bus = network.bus
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
     return {
-        key: words[key] if key in words else _number(numbers[key], sorts[key])
+        key: words[key] if key in words else _number(numbers.get(key), sorts[key])
         for key in figure_names(network.profile, bus.figures)
     }
 
