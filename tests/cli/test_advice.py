@@ -40,7 +40,7 @@ def test_the_right_words_are_named(busplan: Busplan, tmp_path: Path, arguments: 
 def test_values_of_a_grid_take_units(busplan: Busplan, tmp_path: Path) -> None:
     def rows(values: str) -> str:
         vary = f"cycle.period_us={values}"
-        return busplan("sweep", "paper-1ms", "--vary", vary, "--format", "csv", cwd=tmp_path).stdout
+        return str(busplan("sweep", "paper-1ms", "--vary", vary, "--format", "csv", cwd=tmp_path).stdout)
 
     assert rows("250us,0.5ms,750") == rows("250:0.75ms:250us") == rows("250,500,750") != ""
 

@@ -76,8 +76,8 @@ def test_it_begins_with_one_sentence_has_an_example_to_copy_and_ends_with_its_ex
         assert said.endswith(FAILURES)
     else:
         assert said.endswith(
-            "Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted, 143 terminated, "
-            "129 hung up."
+            "Exit codes: 0 done, 1 the answer is no (findings, no plan, a circle that fails), 2 could not do the job, "
+            "130 interrupted, 143 terminated, 129 hung up."
         )
 
 

@@ -203,7 +203,7 @@ def test_without_a_plan_nothing_is_written(busplan: Run, profile: Path, option: 
         (["mine.toml", "-o", "page.htm", "--format", "html"], "--output page.htm: expected a name ending in .toml"),
         (["mine.toml", "-o", "-", "--format", "json"], "standard output takes one document"),
         (["mine.toml", "-o", "mine.toml", "--force"], "would overwrite mine.toml, which is read"),
-        (["gantry-24", "--axes", "30"], "instead set group.drives.nodes=6, or set group.tool.nodes=3\n"),
+        (["gantry-24", "--axes", "30"], "say --set group.drives.nodes=6 or --set group.tool.nodes=3\n"),
         (["mine.toml", "-o", "no/such/folder.toml"], "no folder"),
         (
             ["mine.toml", "--free", "cabling"],

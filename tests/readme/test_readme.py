@@ -98,7 +98,7 @@ def test_the_commands_for_a_machine_run_as_they_stand(shell: Run, tmp_path: Path
 def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
     (block,) = re.findall(r"^```python\n(.*?)^```$", PAGES[README], re.MULTILINE | re.DOTALL)
     exec(compile(block, "README.md", "exec"), {})
-    assert capsys.readouterr().out == "fits 4\n"
+    assert capsys.readouterr().out == "fits 932\n"
 
 
 def test_there_are_blocks_to_check() -> None:

@@ -179,8 +179,8 @@ def _expected(details: ErrorDetails) -> str:
             f"expected {context['expected']}".replace("'", '"'),
             re.findall("'([^']*)'", context["expected"]),
         )
-        near = did_you_mean(details["input"], words, write=value_text) if isinstance(details["input"], str) else ""
-        return f"{expected}{near and f'; {near}'}"
+        meant = [word for word in words if word.casefold() == str(details["input"]).casefold()]
+        return f"{expected}; did you mean {value_text(meant[0])}?" if meant else expected
     if kind in _OUT_OF_RANGE:
         return f"{_OUT_OF_RANGE[kind].format(**context)}{_as_share(details['input'], context.get('le', inf))}"
     return details["msg"]
