@@ -337,7 +337,7 @@ def github_command(line: str) -> tuple[str, dict[str, str], str]:
 
     properties = dict(one.split("=", 1) for one in match[2].split(","))
     escapes = (("%3A", ":"), ("%2C", ","))
-    return match[1], {key: plain(value, *escapes) for key, value in properties.items()}, match[3]
+    return match[1], {key: plain(value, *escapes) for key, value in properties.items()}, plain(match[3])
 
 
 def test_github_commands_say_file_line_and_message(mixed: Answer) -> None:

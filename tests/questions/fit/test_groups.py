@@ -313,7 +313,7 @@ def test_a_change_of_a_group_is_checked_as_the_file(changes: dict[str, object], 
 
 def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., busplan.Profile]) -> None:
     data = GANTRY.model_dump(exclude_unset=True)
-    with pytest.raises(BusplanError, match=r"bus\.nodes: each"):
+    with pytest.raises(BusplanError, match=r"bus\.nodes: this profile has groups"):
         changed(make(), {"group": data["group"]})
 
 
@@ -343,7 +343,7 @@ def test_what_a_plan_writes_for_groups_passes_the_gate(profile: busplan.Profile,
 def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
     with pytest.raises(
         BusplanError,
-        match=r"axes 30: the nodes of gantry-24 differ; say --set group\.drives\.nodes=6 or --set group\.tool\.nodes=3$",
+        match=r"axes 30: .* differ; say --set group\.drives\.nodes=6 or --set group\.tool\.nodes=3$",
     ):
         busplan.plan(GANTRY, axes=30)
     with pytest.raises(BusplanError, match="nodes: there is nothing of that name to free"):
