@@ -308,7 +308,7 @@ def _tables(answer: LatencyAnswer) -> Iterator[Block]:
     if register.has_many_transactions:
         yield from _by_transaction(answer, figures, register.deadlines)
         return
-    caption = Sentence((f"Phases in us, {answer.subject}",))
+    caption = Sentence(("Phases of ", Code(answer.profile.name), f" in us, {answer.subject}"))
     for table in answer.tables:
         columns = [
             FigureColumn(
@@ -375,7 +375,8 @@ def _by_transaction(
                 )
                 for transaction, share in shares
             )
-            caption = Sentence((f"Times in us by the {' and the '.join(models)} model, {answer.subject}",))
+            by = f" by the {' and the '.join(models)} model in us, {answer.subject}"
+            caption = Sentence((Code(answer.profile.name), by))
             shown = Table(columns, tuple(rows), caption, heads=1)
             beside = has_deciding and deciding not in models
             yield Detail((shown,), f"the {' and the '.join(models)} model") if beside else shown
