@@ -122,7 +122,7 @@ def test_what_cannot_be_read_is_said(
 def test_faults_of_a_file_are_named_as_it_was_typed(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(repository)
     assert refusal("v1:./broken.toml").startswith("v1:./broken.toml:6:1: bus.nodes = 0: must be 1 or more")
-    assert refusal("v1:large.toml").startswith("v1:large.toml:1:1: the file is larger than 2,000,000 bytes")
+    assert refusal("v1:large.toml").startswith("v1:large.toml:1:1: the file is over 2,000,000 bytes")
 
 
 def test_without_a_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -202,7 +202,7 @@ def test_a_large_file_is_not_even_read(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.chdir(tmp_path)
     some = "0" * 40
     fake_git(tmp_path, monkeypatch, f'[ "$4" = blob ] && touch read; echo {some} blob 9000000000')
-    assert refusal("HEAD:line.toml").startswith("HEAD:line.toml:1:1: the file is larger than 2,000,000 bytes")
+    assert refusal("HEAD:line.toml").startswith("HEAD:line.toml:1:1: the file is over 2,000,000 bytes")
     assert not (tmp_path / "read").exists()
 
 

@@ -32,7 +32,7 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
         "largest doubt": "execution time, +/- 5 us",
         "rests on": "an instant host, no busy retries, PHYs of 14 ticks and 2 more",
         "never measured": "a cycle node by node; only its transactions were measured",
-        "correction": "6.62 us in what is used: measured buses take so much longer than the timing model",
+        "correction": "6.62 us included in used: measured buses take this much longer than the timing model",
         "checked against": "broadcasts (the dVRK)",
         "paper model": "fits: 207 us of 250; the standard model decides",
     }
