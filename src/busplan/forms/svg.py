@@ -9,20 +9,7 @@ from math import ceil, cos, radians, sin
 from typing import TYPE_CHECKING, Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from busplan.forms.charts import (
-    ChartCell,
-    ChartGrid,
-    Curve,
-    Curves,
-    Dial,
-    Drawing,
-    Entry,
-    Lanes,
-    Panel,
-    Ruler,
-    Span,
-    legend,
-)
+from busplan.forms import charts
 from busplan.forms.inks import styled
 from busplan.forms.lines import Line, wrapped
 from busplan.forms.scale import placed
@@ -71,12 +58,12 @@ _LETTER, _SMALL_LETTER = 8, 7
 _NAMESPACE: Final = "http://www.w3.org/2000/svg"
 
 
-def inline(drawing: Drawing) -> str:
+def inline(drawing: charts.Drawing) -> str:
     """A drawing for a page that has the style sheet."""
     return _drawn(drawing, room=_PHONE)
 
 
-def content(drawing: Drawing, form: "Picture", *, note: str = "") -> str | bytes:
+def content(drawing: charts.Drawing, form: "Picture", *, note: str = "") -> str | bytes:
     """A drawing as a file of its own, with its title and a note after it. A screen of 320 px has room for it.
 
     A png needs the extra `plot`.
@@ -87,7 +74,7 @@ def content(drawing: Drawing, form: "Picture", *, note: str = "") -> str | bytes
     return png(styled(_drawn(drawing, room=WIDTH * (1 - 2 * _MARGIN / 100), is_file=True)))
 
 
-def _drawn(drawing: Drawing, *, room: float, is_file: bool = False) -> str:
+def _drawn(drawing: charts.Drawing, *, room: float, is_file: bool = False) -> str:
     root = _root(drawing.title)
     if drawing.description:
         SubElement(root, "desc").text = drawing.description
@@ -101,7 +88,7 @@ def _drawn(drawing: Drawing, *, room: float, is_file: bool = False) -> str:
         sheet.y += _GAP
     for panel in drawing.panels:
         sheet.panel(panel)
-    sheet.legend(legend(drawing.panels))
+    sheet.legend(charts.legend(drawing.panels))
     return _markup(root, height=sheet.y + (_GAP if is_file else 0))
 
 
@@ -147,7 +134,7 @@ def _line(parent: Element, x: tuple[str, str], y: tuple[float, float], *, css: s
     SubElement(parent, "line", {**ends, "class": css})
 
 
-def _dot(parent: Element, entry: Entry, *, x: str, y: float, title: str = "") -> None:
+def _dot(parent: Element, entry: charts.Entry, *, x: str, y: float, title: str = "") -> None:
     dot = SubElement(parent, "circle", {"cx": x, "cy": f"{y:.5g}", "r": "7", "class": f"dot {entry.ink}"})
     if title:
         SubElement(dot, "title").text = title
@@ -163,7 +150,7 @@ class _Area(NamedTuple):
 
     area: Element
     """Element with text and marks: x in percent, y in px of the drawing."""
-    plot: ChartGrid | Curves
+    plot: charts.ChartGrid | charts.Curves
     top: float
     width: float
     height: float
@@ -223,22 +210,22 @@ class _Sheet:
             self.y += _LINE
             _text(self._body, line.text, x=f"{x:g}", y=self.y - 5, css=css)
 
-    def panel(self, panel: Panel) -> None:
+    def panel(self, panel: charts.Panel) -> None:
         """Draw a chart below its title."""
         self.words(panel.title, css=f"head {panel.tone}")
         self.words(panel.words, css="small")
         match panel.plot:
-            case ChartGrid():
+            case charts.ChartGrid():
                 self._grid(panel.plot)
-            case Curves():
+            case charts.Curves():
                 self._curves(panel.plot)
-            case Lanes():
+            case charts.Lanes():
                 self._lanes(panel.plot)
-            case Dial():
+            case charts.Dial():
                 self._dial(panel.plot)
         self.y += _GAP
 
-    def legend(self, entries: Sequence[Entry]) -> None:
+    def legend(self, entries: Sequence[charts.Entry]) -> None:
         """Draw the entries one after the other, in lines."""
         x = 0.0
         for entry in entries:
@@ -262,7 +249,7 @@ class _Sheet:
 
     # --- scales
 
-    def _area(self, plot: ChartGrid | Curves, *, height: float) -> _Area:
+    def _area(self, plot: charts.ChartGrid | charts.Curves, *, height: float) -> _Area:
         """Draw both scales, and return the plot between them."""
         across, up = plot.across, plot.up
         _text(self._body, up.label, y=self.y + 14, css="small")
@@ -273,7 +260,7 @@ class _Sheet:
         places = [(height * (1 - up.share(tick.at)), _ROW) for tick in up.ticks]
         for number in placed(places, room=height + _ROW, own=up.own_tick):
             y = top + places[number][0]
-            if isinstance(plot, Curves):
+            if isinstance(plot, charts.Curves):
                 _line(area, ("0", "100%"), (y, y), css="rule")
             css = "small here" if number == up.own_tick else "small"
             _text(self._body, up.ticks[number].label, x=f"{gutter - 2:.5g}%", y=round(y) + 4, css=css, anchor="end")
@@ -283,7 +270,7 @@ class _Sheet:
         self.y += _LINE + 2
         return _Area(area, plot, top, width, height)
 
-    def _across(self, area: Element, ruler: Ruler, *, room: float) -> None:
+    def _across(self, area: Element, ruler: charts.Ruler, *, room: float) -> None:
         """Draw the ticks of a scale below a plot at least `room` px wide."""
         labels = [(room * ruler.share(tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
         for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=ruler.own_tick).items():
@@ -297,7 +284,7 @@ class _Sheet:
 
     # --- cells
 
-    def _grid(self, grid: ChartGrid) -> None:
+    def _grid(self, grid: charts.ChartGrid) -> None:
         rows, columns = len(grid.rows), len(grid.rows[0])
         tall = _TALL if rows <= _MOST_TALL else _HEIGHT / rows
         area = self._area(grid, height=tall * rows)
@@ -328,7 +315,7 @@ class _Sheet:
                 _frame(area.area, x=left, y=area.y(y) - tall / 2, width=_percent(wide), height=tall)
 
     @staticmethod
-    def _marks(area: Element, row: Sequence[ChartCell | None], *, y: float, every: int) -> None:
+    def _marks(area: Element, row: Sequence[charts.ChartCell | None], *, y: float, every: int) -> None:
         """Write the marks of a row, one for `every` alike cells, as one text, because a page has many maps."""
         marks, places, start = "", [], 0
         for mark, run in groupby("" if cell is None else cell.mark for cell in row):
@@ -342,7 +329,7 @@ class _Sheet:
 
     # --- curves
 
-    def _curves(self, curves: Curves) -> None:
+    def _curves(self, curves: charts.Curves) -> None:
         area = self._area(curves, height=_CURVES)
         for shade in curves.shades:
             low, high = (curves.across.share(end) for end in (shade.low, shade.high))
@@ -366,7 +353,7 @@ class _Sheet:
 
     # --- bars
 
-    def _lanes(self, lanes: Lanes) -> None:
+    def _lanes(self, lanes: charts.Lanes) -> None:
         gutter = 0.0
         if lanes.is_beside:
             gutter = min(_GUTTER, 100 * _SMALL_LETTER * max(len(lane.label) for lane in lanes.lanes) / self._room)
@@ -392,7 +379,7 @@ class _Sheet:
 
     # --- circles
 
-    def _dial(self, dial: Dial) -> None:
+    def _dial(self, dial: charts.Dial) -> None:
         wide, tall = _DIAL
         sheet = {"y": f"{self.y:g}", "width": "100%", "height": f"{tall}"}
         box = SubElement(self._body, "svg", {**sheet, "viewBox": f"{-wide / 2:g} {-tall / 2:g} {wide} {tall}"})
@@ -410,7 +397,7 @@ class _Sheet:
         self.y += tall
 
 
-def _borders(grid: ChartGrid) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+def _borders(grid: charts.ChartGrid) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
     """Edges between cells inside and outside, as shares of the plot."""
     wide, tall = 1 / len(grid.rows[0]), 1 / len(grid.rows)
     inside = [[None if cell is None else cell.is_inside for cell in row] for row in grid.rows]
@@ -424,7 +411,7 @@ def _borders(grid: ChartGrid) -> Iterator[tuple[tuple[float, float], tuple[float
                 yield (x * wide, (y + 1) * tall), ((x + 1) * wide, (y + 1) * tall)
 
 
-def _path(area: _Area, curve: Curve) -> str:
+def _path(area: _Area, curve: charts.Curve) -> str:
     pieces, is_joined = [], False
     for x, y in curve.points:
         if y is not None:
@@ -434,7 +421,7 @@ def _path(area: _Area, curve: Curve) -> str:
     return "".join(pieces)
 
 
-def _span(area: Element, span: Span, ruler: Ruler, *, y: float, height: float) -> None:
+def _span(area: Element, span: charts.Span, ruler: charts.Ruler, *, y: float, height: float) -> None:
     """Draw a bar, with its letter if there is room."""
     start, end = (100 * min(1.0, max(0.0, ruler.share(at))) for at in (span.start, span.end))
     width, ink = f"{end - start:.5g}%", span.entry.ink
@@ -468,7 +455,7 @@ def _arrow(*, is_clockwise: bool) -> str:
     return f"{arc}M{_place(back, _ARROW - 0.05)}L{_place(end, _ARROW)}L{_place(back, _ARROW + 0.05)}"
 
 
-def _outlines(dial: Dial) -> Iterator[str]:
+def _outlines(dial: charts.Dial) -> Iterator[str]:
     """Outlines of the band, one for each part of the circle without a gap."""
     sectors = len(dial.inner)
     first = next((number for number, radius in enumerate(dial.inner) if radius is None), -1) + 1

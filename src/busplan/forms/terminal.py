@@ -5,6 +5,7 @@ from itertools import groupby
 from typing import Final, cast
 
 from busplan.english import printable
+from busplan.forms import charts
 from busplan.forms.blocks import (
     Block,
     Calculation,
@@ -22,7 +23,6 @@ from busplan.forms.blocks import (
     Snippet,
     Table,
 )
-from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Lane, Lanes, Panel, Ruler, legend
 from busplan.forms.lines import BLANK, Line, Mark, legend_lines, plain_text, styled_text, wrapped
 from busplan.forms.numbers import not_shown, sentence_line, with_unit
 from busplan.forms.scale import placed
@@ -86,7 +86,7 @@ _NARROWEST: Final = 60
 """Columns of lanes, at least."""
 
 
-def drawing_lines(drawing: Drawing, width: int) -> list[Line]:
+def drawing_lines(drawing: charts.Drawing, width: int) -> list[Line]:
     """A drawing in characters, `width` columns wide."""
     lines: list[Line] = []
     for panel in drawing.panels:
@@ -94,21 +94,21 @@ def drawing_lines(drawing: Drawing, width: int) -> list[Line]:
     return lines
 
 
-def _panel(panel: Panel, width: int) -> Iterator[Line]:
+def _panel(panel: charts.Panel, width: int) -> Iterator[Line]:
     """A chart and its legend. Bars with a lane and a label each need none."""
     match panel.plot:
-        case ChartGrid():
+        case charts.ChartGrid():
             yield from (*_grid(panel.plot, width), BLANK)
-        case Lanes():
+        case charts.Lanes():
             yield from _lanes(panel.title, panel.plot, max(width, _NARROWEST))
             if all(len(lane.spans) == 1 for lane in panel.plot.lanes):
                 return
-    marks = ((_OWN if entry.ink == "frame" else entry.mark, entry) for entry in legend([panel]))
+    marks = ((_OWN if entry.ink == "frame" else entry.mark, entry) for entry in charts.legend([panel]))
     words = [f"{mark} {entry.words}".lstrip() for mark, entry in marks if entry.shape == "area"]
     yield from legend_lines(words, width=width)
 
 
-def _grid(grid: ChartGrid, width: int) -> Iterator[Line]:
+def _grid(grid: charts.ChartGrid, width: int) -> Iterator[Line]:
     """Marks of a grid, one line for each row of cells, the last row on top."""
     names, labels = ([tick.label for tick in ruler.ticks] for ruler in (grid.across, grid.up))
     gutter = 2 + max(map(len, labels))
@@ -130,7 +130,7 @@ def _grid(grid: ChartGrid, width: int) -> Iterator[Line]:
     yield Line(f"{indent}{below}".rstrip(), "drawn")
 
 
-def _tones(row: Sequence[ChartCell | None], *, start: int, size: int) -> Iterator[Mark]:
+def _tones(row: Sequence[charts.ChartCell | None], *, start: int, size: int) -> Iterator[Mark]:
     """Colours of runs of equal cells, for a terminal."""
     for tone, run in groupby("neutral" if cell is None else cell.tone for cell in row):
         end = start + size * len(list(run))
@@ -139,7 +139,7 @@ def _tones(row: Sequence[ChartCell | None], *, start: int, size: int) -> Iterato
         start = end
 
 
-def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
+def _lanes(title: str, lanes: charts.Lanes, width: int) -> Iterator[Line]:
     """Lines of lanes; notes are before the bars if these keep half of the width."""
     labels = max(len(lane.label) for lane in lanes.lanes)
     notes = max(len(lane.note) for lane in lanes.lanes)
@@ -157,7 +157,7 @@ def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
     yield Line(f"{ruler.label:<{gutter + 2}}{below.rstrip()}", "drawn")
 
 
-def _cells(lane: Lane, ruler: Ruler, columns: int) -> str:
+def _cells(lane: charts.Lane, ruler: charts.Ruler, columns: int) -> str:
     """Characters of a lane. Each column has the mark that takes most of it, or a space."""
     size = (ruler.high - ruler.low) / columns
     parts: list[dict[str, float]] = [{} for _ in range(columns)]

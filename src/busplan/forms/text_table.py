@@ -5,7 +5,7 @@ from itertools import groupby, zip_longest
 from typing import Final, NamedTuple
 
 from busplan.english import printable
-from busplan.forms.blocks import Cell, Sentence, ShownValue, Table, TableColumn, TableRow, Words
+from busplan.forms import blocks
 from busplan.forms.lines import BLANK, Line, Mark, Tone, least_width, wrapped
 from busplan.forms.numbers import cell_text, left_out_sentence
 
@@ -26,7 +26,7 @@ class _Column(NamedTuple):
 
     number: int
     """Index of the column in the table."""
-    kind: TableColumn
+    kind: blocks.TableColumn
     heads: tuple[str, ...]
     """Unit, heading and group, from the bottom."""
     cells: list[str]
@@ -52,7 +52,7 @@ class _Placed(NamedTuple):
     width: int
 
 
-def table_lines(table: Table, *, width: int | None, is_whole: bool, whole_by: str) -> list[Line]:
+def table_lines(table: blocks.Table, *, width: int | None, is_whole: bool, whole_by: str) -> list[Line]:
     """Lines of a table: words left, figures right, a rule below the headings, and remarks on what is left out.
 
     Columns of drawings are left out: another column has the figure. `width` is that of the terminal, None for any; a
@@ -84,7 +84,7 @@ def table_lines(table: Table, *, width: int | None, is_whole: bool, whole_by: st
     return [*lines, *(wrapped(Line(notes), width) if notes else [])]
 
 
-def _column(number: int, kind: TableColumn, rows: Sequence[TableRow]) -> _Column:
+def _column(number: int, kind: blocks.TableColumn, rows: Sequence[blocks.TableRow]) -> _Column:
     """The column as text. The first one is indented, and a figure that fails has its mark."""
     heads = tuple(filter(None, (kind.unit, kind.heading, kind.group)))
     cells = [("  " * row.level if number == 0 else "") + _one_line(row.cells[number]) for row in rows]
@@ -101,17 +101,17 @@ def _column(number: int, kind: TableColumn, rows: Sequence[TableRow]) -> _Column
     return _Column(number, kind, heads, cells, [_tone(row.cells[number]) for row in rows], natural, least, broken)
 
 
-def _one_line(cell: Cell) -> str:
+def _one_line(cell: blocks.Cell) -> str:
     return printable(" ".join(cell_text(cell).split()))
 
 
-def _is_failing_figure(cell: Cell) -> bool:
+def _is_failing_figure(cell: blocks.Cell) -> bool:
     """Whether a cell is a figure that fails. Words that fail say so themselves."""
-    return isinstance(cell, ShownValue) and cell.state == "fails" and not isinstance(cell.value, str)
+    return isinstance(cell, blocks.ShownValue) and cell.state == "fails" and not isinstance(cell.value, str)
 
 
-def _tone(cell: Cell) -> Tone:
-    return cell.state if isinstance(cell, ShownValue | Words | Sentence) else "neutral"
+def _tone(cell: blocks.Cell) -> Tone:
+    return cell.state if isinstance(cell, blocks.ShownValue | blocks.Words | blocks.Sentence) else "neutral"
 
 
 def _arranged(
@@ -191,7 +191,7 @@ def _laid(cells: Sequence[str], placed: Sequence[_Placed]) -> str:
     return (" " * _GAP).join(pieces).rstrip()
 
 
-def _row_lines(row: TableRow, at: int, placed: Sequence[_Placed]) -> Iterator[Line]:
+def _row_lines(row: blocks.TableRow, at: int, placed: Sequence[_Placed]) -> Iterator[Line]:
     """Lines of a row, several if words in it are wrapped; each state is marked."""
     pieces = [[line.text for line in _cell_lines(place.column.cells[at], place.width)] for place in placed]
     for cells in zip_longest(*pieces, fillvalue=""):

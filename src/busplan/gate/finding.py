@@ -8,16 +8,7 @@ from busplan.buses.limits import Value
 from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity
 from busplan.elementwise import within
 from busplan.english import listed, printable, told_apart
-from busplan.gate.rules import (
-    CIRCLE,
-    IMPOSSIBLE_CIRCLE,
-    LONG_CIRCLE,
-    NOT_RECORDED,
-    NOTHING_RECORDED,
-    OF_CIRCLE,
-    OF_STABILITY,
-    OUTSIDE_PLAN,
-)
+from busplan.gate import rules
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import LoadedProfile, Spot
 from busplan.profile.edit import short_text
@@ -160,7 +151,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
     """
     profile, network, most_steps = subject.profile, subject.network, subject.circle_steps
     refused = refusals(network) if profile.asks_for_circle else ()
-    yield from ((IMPOSSIBLE_CIRCLE, _refused(cause, profile)) for cause in refused)
+    yield from ((rules.IMPOSSIBLE_CIRCLE, _refused(cause, profile)) for cause in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.questions.circle.failures import STABILITY
@@ -169,7 +160,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
     steps = path_steps(network)
     if steps > most_steps:
         words = f"the circle was not run: {steps:,} steps, over the limit of {most_steps:,}"
-        yield LONG_CIRCLE, RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
+        yield rules.LONG_CIRCLE, RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
     result = run_circles(network).results[0]
     first = result.to_attack
@@ -186,7 +177,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
             way_out = attack
         elif is_stability and profile.servo.position_gain_per_s:
             way_out = "lower servo.position_gain_per_s or what delays the loop"
-        yield OF_STABILITY if is_stability else OF_CIRCLE, RuleProblem(key, failure.text, way_out)
+        yield rules.OF_STABILITY if is_stability else rules.OF_CIRCLE, RuleProblem(key, failure.text, way_out)
 
 
 def _refused(cause: Refused, profile: Profile) -> RuleProblem:
@@ -208,11 +199,11 @@ def _key_in_file(*keys: str, profile: Profile) -> str:
 
 def circle_rules_run(subject: Subject, problems: Iterable[tuple[Rule, RuleProblem]]) -> set[str]:
     """Codes of the circle rules that were checked: all for a circle that was run, else the rule on why it was not."""
-    not_run = {rule.code for rule, _ in problems if rule in (IMPOSSIBLE_CIRCLE, LONG_CIRCLE)}
+    not_run = {rule.code for rule, _ in problems if rule in (rules.IMPOSSIBLE_CIRCLE, rules.LONG_CIRCLE)}
     if not_run:
         return not_run
     is_run = subject.circle_steps is not None and (subject.deciding.fits or not subject.profile.asks_for_circle)
-    return {rule.code for rule in (CIRCLE if is_run else (IMPOSSIBLE_CIRCLE,))}
+    return {rule.code for rule in (rules.CIRCLE if is_run else (rules.IMPOSSIBLE_CIRCLE,))}
 
 
 _UNPLANNED: Final = "name"
@@ -239,11 +230,11 @@ def plan_problems(profile: Profile, recording: Recording) -> Iterator[tuple[Rule
     for figure in answer.figures:
         way_out = "busplan measured --apply writes what was measured" if answer.edits.get(figure.key) else ""
         if figure.verdict == "outside":
-            yield OUTSIDE_PLAN, RuleProblem(figure.key or _UNPLANNED, _words(figure), way_out)
+            yield rules.OUTSIDE_PLAN, RuleProblem(figure.key or _UNPLANNED, _words(figure), way_out)
         elif figure.verdict == "not shown" and not answer.shows_nothing:
-            yield NOT_RECORDED, RuleProblem(figure.key or _UNPLANNED, f"not shown: {_words(figure)}", way_out)
+            yield rules.NOT_RECORDED, RuleProblem(figure.key or _UNPLANNED, f"not shown: {_words(figure)}", way_out)
     for reason in answer.shows_nothing:
-        yield NOTHING_RECORDED, RuleProblem(_UNPLANNED, reason, "record it anew")
+        yield rules.NOTHING_RECORDED, RuleProblem(_UNPLANNED, reason, "record it anew")
 
 
 def _words(figure: RecordedFigure) -> str:

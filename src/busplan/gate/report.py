@@ -14,8 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from busplan import __version__
 from busplan.buses.rule import Rule, Severity
 from busplan.english import nouns, plural, printable, printable_lines, to_json, told_apart
-from busplan.forms import markdown, terminal
-from busplan.forms.blocks import Code, JsonDocument, Report, Sentence, State, count_value, joined, sentence
+from busplan.forms import blocks, markdown, terminal
 from busplan.forms.lines import BLANK, Line, Mark, Tone, plain_text, styled_text
 from busplan.forms.markdown import code, escaped, table
 from busplan.forms.numbers import MISSING, sentence_text
@@ -112,36 +111,38 @@ _TOLD_ONCE: Final = ("BP112",)
 """Rules of which text has one finding of each file."""
 
 
-def check_report(report: CheckReport) -> Report:
+def check_report(report: CheckReport) -> blocks.Report:
     """Report of `check`."""
-    return Report(
-        Sentence(("Check of profiles",)),
+    return blocks.Report(
+        blocks.Sentence(("Check of profiles",)),
         tuple(_sentences(report)),
         check_document(report),
         [{"path": located.path, **located.finding.record} for located in report.located],
     )
 
 
-def _sentences(report: CheckReport) -> Iterator[Sentence]:
+def _sentences(report: CheckReport) -> Iterator[blocks.Sentence]:
     """Each finding, each file that could not be checked, and the summary."""
     for located in report.told:
         place, words = finding_parts(located.path, located.finding)
-        yield Sentence((Code(place), f" {words}"), "fails" if located.finding.severity == "error" else "warns")
-    yield from (Sentence((file.failure,), "fails") for file in report.files if file.failure is not None)
+        yield blocks.Sentence(
+            (blocks.Code(place), f" {words}"), "fails" if located.finding.severity == "error" else "warns"
+        )
+    yield from (blocks.Sentence((file.failure,), "fails") for file in report.files if file.failure is not None)
     yield summary_sentence(report)
 
 
-def summary_sentence(report: CheckReport) -> Sentence:
+def summary_sentence(report: CheckReport) -> blocks.Sentence:
     """Sentence with the number of profiles checked, and of what was found."""
     counts = report.summary
     failed = sum(file.failure is not None for file in report.files)
     checked = counts.files - failed
-    summary = sentence(
+    summary = blocks.sentence(
         f"checked {{}} {nouns(checked, 'profile')}: {{}} {nouns(counts.errors, 'error')}, "
         f"{{}} {nouns(counts.warnings, 'warning')}",
-        count_value(checked, "files"),
-        count_value(counts.errors, "errors"),
-        count_value(counts.warnings, "warnings"),
+        blocks.count_value(checked, "files"),
+        blocks.count_value(counts.errors, "errors"),
+        blocks.count_value(counts.warnings, "warnings"),
         state=_state(report),
     )
     parts = (
@@ -151,16 +152,18 @@ def summary_sentence(report: CheckReport) -> Sentence:
         (len(report.located) - len(report.told), "{} similar findings not shown (--verbose)"),
         (report.others, f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"),
     )
-    return joined(summary, *(sentence(words, count_value(number)) for number, words in parts if number), by="; ")
+    return blocks.joined(
+        summary, *(blocks.sentence(words, blocks.count_value(number)) for number, words in parts if number), by="; "
+    )
 
 
-def _state(report: CheckReport) -> State:
+def _state(report: CheckReport) -> blocks.State:
     if report.failed or report.has_findings("error"):
         return "fails"
     return "warns" if report.has_findings("warning") else "passes"
 
 
-def check_document(report: CheckReport) -> JsonDocument:
+def check_document(report: CheckReport) -> blocks.JsonDocument:
     """Document of `busplan check --format json`."""
     files = []
     for file in report.files:
@@ -349,7 +352,7 @@ def sarif(report: CheckReport) -> str:
     return to_json(document)
 
 
-def _rule(rule: Rule) -> JsonDocument:
+def _rule(rule: Rule) -> blocks.JsonDocument:
     page = rule_report(rule)
     return {
         "id": rule.code,
@@ -361,7 +364,7 @@ def _rule(rule: Rule) -> JsonDocument:
     }
 
 
-def _result(located: Located) -> JsonDocument:
+def _result(located: Located) -> blocks.JsonDocument:
     finding = located.finding
     return {
         "ruleId": finding.code,
@@ -386,7 +389,7 @@ def _result(located: Located) -> JsonDocument:
     }
 
 
-def _suppressed_result(path: str, suppressed: Suppressed) -> JsonDocument:
+def _suppressed_result(path: str, suppressed: Suppressed) -> blocks.JsonDocument:
     kind = "inSource" if suppressed.by == "comment" else "external"
     located = Located(path, suppressed.finding, "", _fingerprint(path, suppressed.finding, "suppressed"))
     why = {"justification": suppressed.reason} if suppressed.reason else {}

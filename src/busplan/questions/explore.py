@@ -11,7 +11,7 @@ from typing import Final
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Card, Code, Explorer, JsonDocument, Record, Report, Sentence, Slider
+from busplan.forms import blocks
 from busplan.progress import Progress, ignored, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
@@ -63,9 +63,9 @@ class ExploreAnswer(Answer):
     profile: Profile
     over: Direction | None
     maps: tuple[MapAnswer, ...]
-    cards: tuple[tuple[Card | None, ...], ...]
+    cards: tuple[tuple[blocks.Card | None, ...], ...]
 
-    def report(self) -> Report:
+    def report(self) -> blocks.Report:
         """The answer in blocks: sliders on a page of HTML, the map of this design in every other form."""
         number = 0 if self.over is None else _own_place(self.over, self.profile)
         here = self.maps[number]
@@ -81,21 +81,23 @@ class ExploreAnswer(Answer):
         # The first slider is the vertical direction, as in the title of a map.
         places = [(up, row), (across, column), *([] if self.over is None else [(self.over, number)])]
         sliders = tuple(
-            Slider(title_of(along, here.profile), tuple(value_text(along, value) for value in along.values), place)
+            blocks.Slider(
+                title_of(along, here.profile), tuple(value_text(along, value) for value in along.values), place
+            )
             for along, place in places
         )
         drawings = tuple(map_drawing(answer, frame=(row, column)) for answer in self.maps)
-        explorer = Explorer(sliders, self.cards, first, drawings, number, tuple(here.report().blocks))
+        explorer = blocks.Explorer(sliders, self.cards, first, drawings, number, tuple(here.report().blocks))
         name = self.profile.name
-        return Report(
-            Sentence(("What a change does to ", Code(name))),
+        return blocks.Report(
+            blocks.Sentence(("What a change does to ", blocks.Code(name))),
             (explorer,),
             self._document(),
             with_profile(name, [record for _, whole in self._documents() for record in whole["cells"]]),
             is_page=True,
         )
 
-    def _document(self) -> JsonDocument:
+    def _document(self) -> blocks.JsonDocument:
         return document(
             "explore",
             profile=self.profile.name,
@@ -104,7 +106,7 @@ class ExploreAnswer(Answer):
             maps=[{"over": value, **whole} for value, whole in self._documents()],
         )
 
-    def _documents(self) -> Iterator[tuple[Value | None, Record]]:
+    def _documents(self) -> Iterator[tuple[Value | None, blocks.Record]]:
         """The document of each map, and the value of the third direction, which its cells have, too."""
         for value, answer in zip((None,) if self.over is None else self.over.values, self.maps, strict=True):
             whole = map_document(answer)
@@ -226,7 +228,7 @@ def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
         raise BusplanError(f"{settings:,} settings; an explorer has up to {MOST_SETTINGS:,}: give fewer values")
 
 
-def _card(answer: MapAnswer, verdict: Verdict | None, cell: Cell | NotDrawn) -> Card | None:
+def _card(answer: MapAnswer, verdict: Verdict | None, cell: Cell | NotDrawn) -> blocks.Card | None:
     if verdict is None or isinstance(cell, NotDrawn):
         return None
     made, circle = verdict.card, circle_words(answer, cell)

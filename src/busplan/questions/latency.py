@@ -11,22 +11,9 @@ from busplan.buses.figure import Figure
 from busplan.buses.network import Network
 from busplan.elementwise import Number, existing, within
 from busplan.errors import BusplanError
-from busplan.forms.blocks import (
-    Block,
-    Code,
-    Detail,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    State,
-    Table,
-    TableColumn,
-    TableRow,
-    attribute_value,
-    sentence,
-)
+from busplan.forms import blocks
 from busplan.forms.numbers import known_text
+from busplan.questions.base import sentences
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import (
     Models,
@@ -36,15 +23,6 @@ from busplan.questions.base.arguments import (
     one_or_several,
     whole_number,
     with_its_constants,
-)
-from busplan.questions.base.sentences import (
-    FigureColumn,
-    document,
-    execution_sentence,
-    fields,
-    figure_table,
-    warning_sentences,
-    with_profile,
 )
 from busplan.questions.fit.figures import FitFigures, figures
 from busplan.questions.fit.network import not_applicable, warnings_of, with_payloads
@@ -89,24 +67,26 @@ class LatencyAnswer(Answer):
     subject: str
     tables: tuple[tuple[Transaction, ...], ...]
     deciding: tuple[FitFigures, ...]
-    deadlines: tuple[Sentence, ...]
-    notes: tuple[Sentence, ...]
+    deadlines: tuple[blocks.Sentence, ...]
+    notes: tuple[blocks.Sentence, ...]
 
     @property
     def transactions(self) -> tuple[Transaction, ...]:
         """One transaction for each payload, kind and timing model, nested in this order, with its `phases`."""
         return tuple(transaction for table in self.tables for transaction in table)
 
-    def report(self) -> Report:
+    def report(self) -> blocks.Report:
         """The answer in blocks."""
         name, records = self.profile.name, _records(self.transactions)
         # Other payloads are those of another machine.
-        verdict = fields(self.deciding[0], "verdict", "exceeded", "not_shown") if len(self.deciding) == 1 else {}
-        return Report(
-            Sentence(("Latency of ", Code(name))),
+        verdict = (
+            sentences.fields(self.deciding[0], "verdict", "exceeded", "not_shown") if len(self.deciding) == 1 else {}
+        )
+        return blocks.Report(
+            blocks.Sentence(("Latency of ", blocks.Code(name))),
             tuple(_blocks(self)),
-            document("latency", profile=name, **verdict, transactions=records),
-            with_profile(name, records),
+            sentences.document("latency", profile=name, **verdict, transactions=records),
+            sentences.with_profile(name, records),
         )
 
     def _headline(self) -> str:
@@ -206,7 +186,7 @@ def _shown_phases(phases: Mapping[str, Number]) -> dict[str, float | None]:
     }
 
 
-def _records(transactions: Sequence[Transaction]) -> list[Record]:
+def _records(transactions: Sequence[Transaction]) -> list[blocks.Record]:
     """One flat row for each transaction and its phases; all have a group where one has, None for what has none."""
     has_groups = any(transaction.group for transaction in transactions)
     return [
@@ -222,7 +202,7 @@ def _records(transactions: Sequence[Transaction]) -> list[Record]:
     ]
 
 
-def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
+def _blocks(answer: LatencyAnswer) -> Iterator[blocks.Block]:
     """The loop over the host in a sentence, and the phases of each transaction; one table for each payload."""
     register = answer.deciding[0].bus_figures
     # Of one payload and of nodes that are alike.
@@ -232,29 +212,31 @@ def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
     yield from answer.deadlines
     if loop and not register.deadlines:
         whole = register.latency_table[-1].key
-        times = [ShownValue(phases[name][whole], whole, "us", 0) for name in ("command", "feedback", "loop")]
-        yield sentence("A command acts after {}, feedback is {} old, a loop takes {}.", *times)
+        times = [blocks.ShownValue(phases[name][whole], whole, "us", 0) for name in ("command", "feedback", "loop")]
+        yield blocks.sentence("A command acts after {}, feedback is {} old, a loop takes {}.", *times)
     yield from _tables(answer)
     if loop and register.deadlines and loop[register.deadlines[0]] is not None:
-        parts = [ShownValue(loop[key], key, "us", 0) for key in (register.deadlines[0], "pipeline_us") if loop[key]]
+        parts = [
+            blocks.ShownValue(loop[key], key, "us", 0) for key in (register.deadlines[0], "pipeline_us") if loop[key]
+        ]
         of_host = ", of which {} are the host's cycles" if len(parts) > 1 else ""
-        yield sentence(f"Loop: {{}} from SYNC to the executed command{of_host}.", *parts)
+        yield blocks.sentence(f"Loop: {{}} from SYNC to the executed command{of_host}.", *parts)
     yield from answer.notes
 
 
-def _notes(networks: Sequence[Network]) -> Iterator[Sentence]:
+def _notes(networks: Sequence[Network]) -> Iterator[blocks.Sentence]:
     """Timing models that do not apply, the grade of the execution times, and warnings."""
     network = networks[0]
     for model, keys in not_applicable(network).items():
-        yield Sentence((f"The {model} model is not applicable: it has no {', '.join(keys)}.",))
-    yield from execution_sentence(network, of_latency=True)
+        yield blocks.Sentence((f"The {model} model is not applicable: it has no {', '.join(keys)}.",))
+    yield from sentences.execution_sentence(network, of_latency=True)
     broken = (limit.words(variant) for variant in networks for limit in variant.bus.broken(variant))
-    yield from warning_sentences((*dict.fromkeys(broken), *warnings_of(network)))
+    yield from sentences.warning_sentences((*dict.fromkeys(broken), *warnings_of(network)))
 
 
 def _deadline_sentence(
     networks: Sequence[Network], tables: Sequence[Sequence[Transaction]], deciding: Sequence[FitFigures]
-) -> Iterator[Sentence]:
+) -> Iterator[blocks.Sentence]:
     """Say whether all transactions keep their deadlines by the model of the verdict, and which is the closest."""
     bus = networks[0].bus
     keys, model = bus.figures.deadlines, bus.deciding_model
@@ -279,14 +261,14 @@ def _deadline_sentence(
         if limit.key in (verdict.not_shown or ())
     )
     is_broken = any(limit.key in verdict.exceeded for limit in limits for verdict in deciding)
-    state: State = "fails" if late else "neutral"
+    state: blocks.State = "fails" if late else "neutral"
     why = f"; not shown: {'; '.join(not_shown)}" if not_shown else ""
     if not_shown and not is_broken:
         is_kept, state = "NOT SHOWN that every message keeps its deadline", "warns"
     time = "has no worst-case response time"
     if us is not None and deadline_us is not None:
         time = f"takes up to {known_text(us, None)} us of {known_text(deadline_us, None)}"
-    yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}{why}.",), state)
+    yield blocks.Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}{why}.",), state)
 
 
 def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:
@@ -297,7 +279,7 @@ def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:
     return inf if us is None else us / deadline_us
 
 
-def _tables(answer: LatencyAnswer) -> Iterator[Block]:
+def _tables(answer: LatencyAnswer) -> Iterator[blocks.Block]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
     register, deciding = answer.deciding[0].bus_figures, answer.deciding[0].timing_model
     figures = [
@@ -308,11 +290,11 @@ def _tables(answer: LatencyAnswer) -> Iterator[Block]:
     if register.has_many_transactions:
         yield from _by_transaction(answer, figures, register.deadlines)
         return
-    caption = Sentence(("Phases of ", Code(answer.profile.name), f" in us, {answer.subject}"))
+    caption = blocks.Sentence(("Phases of ", blocks.Code(answer.profile.name), f" in us, {answer.subject}"))
     for table in answer.tables:
         columns = [
-            FigureColumn(
-                TableColumn(
+            sentences.FigureColumn(
+                blocks.TableColumn(
                     transaction.timing_model,
                     group=_name(transaction),
                     is_detail=_is_beside(transaction, table, deciding),
@@ -322,7 +304,7 @@ def _tables(answer: LatencyAnswer) -> Iterator[Block]:
             for transaction in table
         ]
         shown = set(register.latency_shown or (figure.key for figure in figures))
-        yield figure_table(
+        yield sentences.figure_table(
             [(figure, 0) for figure in figures],
             columns,
             caption=caption,
@@ -348,7 +330,7 @@ _MOST_ROWS: Final = 15
 
 def _by_transaction(
     answer: LatencyAnswer, figures: Sequence[Figure], deadlines: tuple[str, str] | None
-) -> Iterator[Block]:
+) -> Iterator[blocks.Block]:
     """One row for each transaction; one table for each payload and timing model, the deciding one in any answer.
 
     A time and its deadline come first. Of many transactions those closest to their deadlines are shown. What is 0 for
@@ -359,8 +341,8 @@ def _by_transaction(
     ]
     figures.sort(key=lambda figure: figure.key not in (deadlines or ()))
     columns = (
-        TableColumn("message", kind="words"),
-        *(TableColumn(figure.label, rank=_rank(figure, deadlines)) for figure in figures),
+        blocks.TableColumn("message", kind="words"),
+        *(blocks.TableColumn(figure.label, rank=_rank(figure, deadlines)) for figure in figures),
     )
     deciding = answer.deciding[0].timing_model
     for table in answer.tables:
@@ -369,17 +351,17 @@ def _by_transaction(
             shares = [(row, _share(row, deadlines)) for row in of_models]
             least = sorted((share for _, share in shares), reverse=True)[:_MOST_ROWS][-1]
             rows = (
-                TableRow(
-                    (_name(transaction), *(attribute_value(figure, transaction.phases) for figure in figures)),
+                blocks.TableRow(
+                    (_name(transaction), *(blocks.attribute_value(figure, transaction.phases) for figure in figures)),
                     is_detail=share < least,
                 )
                 for transaction, share in shares
             )
             by = f" by the {' and the '.join(models)} model in us, {answer.subject}"
-            caption = Sentence((Code(answer.profile.name), by))
-            shown = Table(columns, tuple(rows), caption, heads=1)
+            caption = blocks.Sentence((blocks.Code(answer.profile.name), by))
+            shown = blocks.Table(columns, tuple(rows), caption, heads=1)
             beside = has_deciding and deciding not in models
-            yield Detail((shown,), f"the {' and the '.join(models)} model") if beside else shown
+            yield blocks.Detail((shown,), f"the {' and the '.join(models)} model") if beside else shown
 
 
 def _rank(figure: Figure, deadlines: tuple[str, str] | None) -> int:

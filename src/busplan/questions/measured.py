@@ -10,22 +10,7 @@ from typing import Final
 from busplan.buses.rule import RecordedFigure, RecordedVerdict
 from busplan.english import plural
 from busplan.errors import BusplanError
-from busplan.forms.blocks import (
-    Block,
-    Cell,
-    Code,
-    JsonDocument,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    Snippet,
-    State,
-    Table,
-    TableColumn,
-    TableRow,
-    Words,
-)
+from busplan.forms import blocks
 from busplan.profile.edit import value_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
@@ -35,24 +20,24 @@ from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
 _COLUMNS: Final = (
-    TableColumn("figure", kind="words", wraps=True),
-    TableColumn("unit", kind="words"),
-    TableColumn("planned"),
-    TableColumn("recorded"),
-    TableColumn("residual", rank=1),
-    TableColumn("U"),
-    TableColumn("within", kind="words"),
-    TableColumn("n", rank=2),
-    TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
+    blocks.TableColumn("figure", kind="words", wraps=True),
+    blocks.TableColumn("unit", kind="words"),
+    blocks.TableColumn("planned"),
+    blocks.TableColumn("recorded"),
+    blocks.TableColumn("residual", rank=1),
+    blocks.TableColumn("U"),
+    blocks.TableColumn("within", kind="words"),
+    blocks.TableColumn("n", rank=2),
+    blocks.TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
 )
 _DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2, "kbit/s": 1}
 _UNITS: Final = {"1": "", "share": "%"}
 """Units that are shown in another way."""
-_WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
+_WITHIN: Final[dict[RecordedVerdict | None, blocks.Cell]] = {
     None: "",
-    "within": Words("yes", "passes"),
-    "not shown": Words("not shown", "warns"),
-    "outside": Words("no", "fails"),
+    "within": blocks.Words("yes", "passes"),
+    "not shown": blocks.Words("not shown", "warns"),
+    "outside": blocks.Words("no", "fails"),
 }
 _SMALL_US: Final = 1.0
 """Time below which more decimals are shown [us]."""
@@ -100,7 +85,7 @@ class MeasuredAnswer(Answer):
         day = f" of {self.day}" if self.day else ""
         return f"busplan measured: {share} of {count} in {PurePath(self.source).name}{day}"
 
-    def report(self, *, applied_to: str | None = None) -> Report:
+    def report(self, *, applied_to: str | None = None) -> blocks.Report:
         """The answer in blocks.
 
         Parameters
@@ -109,8 +94,8 @@ class MeasuredAnswer(Answer):
             File of the profile into which measured values were written; by default none.
         """
         records = [_record(figure) for figure in self.figures]
-        return Report(
-            Sentence((Code(self.profile.name), " beside the recording ", Code(self.source))),
+        return blocks.Report(
+            blocks.Sentence((blocks.Code(self.profile.name), " beside the recording ", blocks.Code(self.source))),
             tuple(_blocks(self)),
             _document(self, records, applied_to=applied_to),
             with_profile(self.profile.name, records),
@@ -177,30 +162,32 @@ def measured(
     return MeasuredAnswer(plan, source, share, *recorded)
 
 
-def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
+def _blocks(answer: MeasuredAnswer) -> Iterator[blocks.Block]:
     counts = Counter(figure.verdict for figure in answer.figures if figure.verdict)
-    state: State = "fails" if counts["outside"] else "warns" if answer.shows_nothing else "passes"
+    state: blocks.State = "fails" if counts["outside"] else "warns" if answer.shows_nothing else "passes"
     inside = f"{counts['within']} of {plural(counts.total(), 'figure')} within the plan"
     share = (
         "the worst recorded" if answer.quantile == 1 else (f"those that {100 * answer.quantile:g} % of the events keep")
     )
-    yield Sentence(
+    yield blocks.Sentence(
         (
-            Code(answer.profile.name),
+            blocks.Code(answer.profile.name),
             " beside ",
-            Code(answer.source),
+            blocks.Code(answer.source),
             ": ",
-            Words(inside, state),
+            blocks.Words(inside, state),
             f"{_named(answer, 'outside')}{_named(answer, 'not shown')}. Jitter and times are {share}.",
         )
     )
-    yield from (Sentence((Words("Shows nothing", "warns"), f": {reason}.")) for reason in answer.shows_nothing)
-    yield Table(_COLUMNS, tuple(map(_row, answer.figures)), stacks=True)
-    yield from (Sentence((remark,)) for remark in answer.remarks)
+    yield from (
+        blocks.Sentence((blocks.Words("Shows nothing", "warns"), f": {reason}.")) for reason in answer.shows_nothing
+    )
+    yield blocks.Table(_COLUMNS, tuple(map(_row, answer.figures)), stacks=True)
+    yield from (blocks.Sentence((remark,)) for remark in answer.remarks)
     values = [f"{key} = {value_text(value)}" for key, value in answer.edits.items() if value is not None]
     if values:
-        yield Sentence(("Measured (--apply writes it into the profile):",))
-        yield Snippet(tuple(values))
+        yield blocks.Sentence(("Measured (--apply writes it into the profile):",))
+        yield blocks.Snippet(tuple(values))
 
 
 def _named(answer: MeasuredAnswer, verdict: RecordedVerdict) -> str:
@@ -208,33 +195,33 @@ def _named(answer: MeasuredAnswer, verdict: RecordedVerdict) -> str:
     return f"; {verdict}: {', '.join(names)}" if names else ""
 
 
-def _row(figure: RecordedFigure) -> TableRow:
+def _row(figure: RecordedFigure) -> blocks.TableRow:
     shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
     unit = _UNITS.get(figure.unit, figure.unit)
     note = ", ".join(filter(None, (figure.hidden, figure.note)))
-    cells = (figure.quantity, unit, *shown, _WITHIN[figure.verdict], ShownValue(figure.events, "events"), note)
+    cells = (figure.quantity, unit, *shown, _WITHIN[figure.verdict], blocks.ShownValue(figure.events, "events"), note)
     is_as_planned = figure.verdict == "within" and figure.recorded == figure.planned and not figure.uncertainty
-    return TableRow(cells, is_detail=is_as_planned)
+    return blocks.TableRow(cells, is_detail=is_as_planned)
 
 
-def _value(figure: RecordedFigure, name: str) -> ShownValue:
+def _value(figure: RecordedFigure, name: str) -> blocks.ShownValue:
     value = getattr(figure, name)
     decimals = _DECIMALS[figure.unit]
     if figure.unit == "us" and max(map(abs, filter(None, (figure.planned, figure.recorded))), default=1) < _SMALL_US:
         decimals = 5
-    return ShownValue(
+    return blocks.ShownValue(
         value, name, _UNITS.get(figure.unit, figure.unit), decimals, signed=name == "residual", fixed=True
     )
 
 
-def _record(figure: RecordedFigure) -> Record:
+def _record(figure: RecordedFigure) -> blocks.Record:
     fields = figure._asdict()
     del fields["is_mean"]
     texts = {name: fields.pop(name) or None for name in ("key", "note", "hidden")}
     return {**fields, "residual": figure.residual, "verdict": figure.verdict, **texts}
 
 
-def _document(answer: MeasuredAnswer, records: list[Record], *, applied_to: str | None) -> JsonDocument:
+def _document(answer: MeasuredAnswer, records: list[blocks.Record], *, applied_to: str | None) -> blocks.JsonDocument:
     return document(
         "measured",
         profile=answer.profile.name,

@@ -19,20 +19,8 @@ from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, 
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
+from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_timing import (
-    LISTED,
-    SentFrames,
-    event_model,
-    faults,
-    frames_by_identifier,
-    fullest_load,
-    least_bit_rate,
-    longest_stretch,
-    mean_period,
-    stamps_of_no_bus,
-    step_us,
-)
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, lateness, periodic_events, quantile
 
 _NOT_SHOWN: Final = (
@@ -69,14 +57,14 @@ class _Log:
         self.traffic = self.cycle.traffic
         self.bit_us = bit_us(self.traffic.bit_rate_kbit_s)
         self.edits: dict[str, Any] = {}
-        self.stretch = longest_stretch(frames)
+        self.stretch = can_timing.longest_stretch(frames)
         self.taken, self.times_us = self.stretch.taken, self.stretch.times_us
-        self.by_identifier = frames_by_identifier(frames, self.stretch)
+        self.by_identifier = can_timing.frames_by_identifier(frames, self.stretch)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
         self.messages = {message.name: message for message in network.profile.message}
-        self.least_bit_rate = least_bit_rate(frames, self.stretch)
-        self.step_us = step_us(self.stretch)
+        self.least_bit_rate = can_timing.least_bit_rate(frames, self.stretch)
+        self.step_us = can_timing.step_us(self.stretch)
         self.stamp_error_us = self.step_us + self._late_stamps_us()
         """Largest error of a stamp: the step of stamps, and what frames come closer than the bus allows [us]."""
 
@@ -118,11 +106,11 @@ class _Log:
             yield from self._stream(stream, label, self._spread_us(stream, shortest.frame_us, phases))
         count = len(self.taken)
         if self.unseen:
-            hidden = f"never in the log: {first_of(self.unseen, LISTED)}"
+            hidden = f"never in the log: {first_of(self.unseen, can_timing.LISTED)}"
             unseen = len(self.unseen)
             yield _limited("frames of the plan never in the log", 0, unseen, count, hidden=hidden)
         frames = sum(len(sent.times_us) for sent in self.unplanned.values())
-        note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], LISTED)
+        note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], can_timing.LISTED)
         yield _limited("frames of no message of the plan", 0, frames, frames, note=note)
 
     def shows_nothing(self) -> Iterator[str]:
@@ -131,7 +119,7 @@ class _Log:
             yield f"no identifier comes {LEAST_EVENTS} times: the log is too short"
         if not self.step_us:
             yield "all frames have one stamp"
-        elif reason := stamps_of_no_bus(self.least_bit_rate.likely):
+        elif reason := can_timing.stamps_of_no_bus(self.least_bit_rate.likely):
             yield reason
         period_us = self.traffic.period_us
         if self.traffic.has_cycle and 2 * self.step_us > period_us:
@@ -187,7 +175,7 @@ class _Log:
         else:
             note = f"{note}; without frames of CAN FD that switch"
             yield RecordedFigure("load", "share", planned, load, None, "shown", count, note=note)
-        fullest = fullest_load(self.times_us, wire_us)
+        fullest = can_timing.fullest_load(self.times_us, wire_us)
         yield RecordedFigure("load, fullest second", "share", planned, fullest, None, "shown", count)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
@@ -226,7 +214,7 @@ class _Log:
                     if number := getattr(pdos, name):
                         notes.append(f"{number:,} of {identifier:#x}")
         for name, notes in lost.items():
-            yield self._missed(f"PDOs {name}", counts[name], counts["due"], note=first_of(notes, LISTED))
+            yield self._missed(f"PDOs {name}", counts[name], counts["due"], note=first_of(notes, can_timing.LISTED))
         behind_us = behind_us[behind_us >= 0]
         if len(behind_us):
             behind = quantile(behind_us, self.share)
@@ -281,14 +269,14 @@ class _Log:
             frames = sum(frames for _, frames in unlike)
             yield _limited(f"{label}: frames of another format", 0, frames, count, key, note=note)
 
-    def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
+    def _sync(self, stream: Stream, sent: can_timing.SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
         """Period of SYNC, equal to that of the plan, and its jitter."""
         periods, planned_us, count = periodic_events(sent.times_us), stream.period_us, len(sent.times_us)
         period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, "cycle.period_us")
         if periods is None:
             yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
             return
-        mean = mean_period(sent.times_us, periods)
+        mean = can_timing.mean_period(sent.times_us, periods)
         doubt_us = expanded(mean.uncertainty, _clocks_us(planned_us), self.stamp_error_us / count)
         yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
         if spread_us is not None:
@@ -304,7 +292,7 @@ class _Log:
                 self.edits[key] = ceil(10 * late.value) / 10
 
     def _message(
-        self, stream: Stream, label: str, recorded: Sequence[SentFrames], spread_us: float | None
+        self, stream: Stream, label: str, recorded: Sequence[can_timing.SentFrames], spread_us: float | None
     ) -> Iterator[RecordedFigure]:
         """Mean distance of a message, and how much sooner it comes than its period; of the identifier that is worst."""
         key, planned_us = f"message.{stream.name}", stream.period_us
@@ -312,7 +300,7 @@ class _Log:
         if not repeated:
             return
 
-        def identifier(sent: SentFrames) -> str:
+        def identifier(sent: can_timing.SentFrames) -> str:
             return f"{sent.identifier:#x}" if len(recorded) > 1 else ""
 
         often = min(repeated, key=lambda sent: sent.mean.value)
@@ -359,7 +347,7 @@ class _Log:
         )
         yield jitter
         if jitter.verdict == "outside":
-            model = event_model(
+            model = can_timing.event_model(
                 sent.times_us, planned_us, stamp_error_us=self.stamp_error_us, tolerance=float(CLOCK_TOLERANCE)
             )
             self.edits[f"{key}.jitter_us"] = model.jitter_us
@@ -379,7 +367,7 @@ class _Log:
     def remarks(self) -> Iterator[str]:
         """Sentences on what the log has beside the figures."""
         frames = self.frames
-        yield from faults(frames, self.stretch)
+        yield from can_timing.faults(frames, self.stretch)
         fd, switched = (int(np.count_nonzero(flags)) for flags in (frames.is_fd, frames.switched))
         if fd:
             left = f", {switched:,} not counted in the load: the plan has no data bit rate"

@@ -4,21 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.english import nouns
-from busplan.forms.blocks import (
-    Block,
-    Cell,
-    Code,
-    Report,
-    Sentence,
-    ShownValue,
-    Snippet,
-    Table,
-    TableColumn,
-    TableRow,
-    count_value,
-    joined,
-    sentence,
-)
+from busplan.forms import blocks
 from busplan.forms.numbers import sentence_text
 from busplan.profile.edit import value_text
 from busplan.questions.base.sentences import document, fields, with_profile
@@ -26,13 +12,13 @@ from busplan.questions.calibrate import REPETITIONS_TO_COMPARE, CalibrateAnswer,
 from busplan.sections.base import TRANSACTION_KINDS
 
 _COLUMNS: Final = {
-    "payload_bytes": TableColumn("payload", "bytes"),
-    "measurements": TableColumn("n"),
-    "left_out": TableColumn("left out"),
-    "latency_us": TableColumn("T_lant", "us", rank=3),
-    "packets_us": TableColumn("packets", "us", rank=2),
-    "execution_us": TableColumn("T_exec", "us"),
-    "deviation_us": TableColumn("std dev", "us", rank=1),
+    "payload_bytes": blocks.TableColumn("payload", "bytes"),
+    "measurements": blocks.TableColumn("n"),
+    "left_out": blocks.TableColumn("left out"),
+    "latency_us": blocks.TableColumn("T_lant", "us", rank=3),
+    "packets_us": blocks.TableColumn("packets", "us", rank=2),
+    "execution_us": blocks.TableColumn("T_exec", "us"),
+    "deviation_us": blocks.TableColumn("std dev", "us", rank=1),
 }
 _DECIMALS: Final = 3
 _MOST_LINES: Final = 10
@@ -40,18 +26,18 @@ _LONG_EXECUTION_US: Final = 10_000.0
 """Time longer than any motion node's execution [us]; latencies that show it are probably in ns."""
 
 
-def time_value(value_us: float, key: str) -> ShownValue:
+def time_value(value_us: float, key: str) -> blocks.ShownValue:
     """A time of a calibration."""
-    return ShownValue(value_us, key, "us", _DECIMALS)
+    return blocks.ShownValue(value_us, key, "us", _DECIMALS)
 
 
-def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Report:
+def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> blocks.Report:
     """Report of `calibrate`; `applied_to` is the profile into which the execution time was written, or None."""
     name = answer.profile.name
     payloads = [fit._asdict() for fit in answer.payloads]
     warned = [*_warnings(answer)]
-    return Report(
-        Sentence(("Execution time of ", Code(name), " from ", Code(answer.source))),
+    return blocks.Report(
+        blocks.Sentence(("Execution time of ", blocks.Code(name), " from ", blocks.Code(answer.source))),
         tuple(_blocks(answer, warned)),
         document(
             "calibrate",
@@ -72,49 +58,49 @@ def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Re
     )
 
 
-def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
+def _blocks(answer: CalibrateAnswer, warned: list[blocks.Sentence]) -> Iterator[blocks.Block]:
     """The fit in sentences, the figures by payload, and the section for the profile."""
     yield fit_sentence(answer)
     where = ", ".join(answer.setup)
-    yield sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
+    yield blocks.sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
     if answer.unchecked_bytes:
         sizes = ", ".join(map(str, answer.unchecked_bytes))
         words = f"that needs {REPETITIONS_TO_COMPARE} measurements of a payload"
-        yield sentence(f"Outliers cannot be found at {sizes} bytes: {words}.")
-    yield from (joined(sentence("Warning: ", state="warns"), warning, by="") for warning in warned)
+        yield blocks.sentence(f"Outliers cannot be found at {sizes} bytes: {words}.")
+    yield from (blocks.joined(blocks.sentence("Warning: ", state="warns"), warning, by="") for warning in warned)
     absent = {"left_out"} if not answer.outliers else set()
     if all(fit.deviation_us is None for fit in answer.payloads):
         absent.add("deviation_us")
     shown = {key: column for key, column in _COLUMNS.items() if key not in absent}
-    rows = (TableRow(tuple(_cell(getattr(fit, key), key) for key in shown)) for fit in answer.payloads)
-    yield Table(tuple(shown.values()), tuple(rows))
+    rows = (blocks.TableRow(tuple(_cell(getattr(fit, key), key) for key in shown)) for fit in answer.payloads)
+    yield blocks.Table(tuple(shown.values()), tuple(rows))
     keys = (f"{key} = {value_text(value)}" for key, value in answer.section.items())
     header = f"[group.execution]  # of {answer.nodes.name}" if answer.nodes.name else f"[{answer.key}]"
-    yield Snippet((header, *keys))
+    yield blocks.Snippet((header, *keys))
 
 
-def _cell(value: float | None, key: str) -> Cell:
+def _cell(value: float | None, key: str) -> blocks.Cell:
     """A cell with a count, or with a time to three decimals, since further ones are rounding."""
     if value is None:
         return ""
-    return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else count_value(value, key)
+    return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else blocks.count_value(value, key)
 
 
-def fit_sentence(answer: CalibrateAnswer) -> Sentence:
+def fit_sentence(answer: CalibrateAnswer) -> blocks.Sentence:
     """Sentence on the measurements whose median is the execution time."""
     number, sizes = answer.measurements, len(answer.payloads)
     without = ", without the outliers" if answer.outliers else ""
-    return sentence(
+    return blocks.sentence(
         f"{{}}: T_exec is the median at each payload, of {{}} {nouns(number, 'measurement')} at {{}} "
         f"{nouns(sizes, 'payload')}{without}, {{}}.",
-        Code(answer.profile.name),
-        count_value(number, "measurements"),
-        count_value(sizes),
-        Code(answer.source),
+        blocks.Code(answer.profile.name),
+        blocks.count_value(number, "measurements"),
+        blocks.count_value(sizes),
+        blocks.Code(answer.source),
     )
 
 
-def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
+def _warnings(answer: CalibrateAnswer) -> Iterator[blocks.Sentence]:
     """Sentences on what to check before these figures are used."""
     for word, outliers in (
         ("slow", [outlier for outlier in answer.outliers if outlier.off_us > 0]),
@@ -126,47 +112,47 @@ def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
     sizes = dict.fromkeys(int(answer.nodes.bytes_of(kind)) for kind in TRANSACTION_KINDS)
     for size in sizes:
         if not execution.covers(size):
-            yield sentence(
+            yield blocks.sentence(
                 f"the profile's payload of {{}} is outside the measured range, {execution.range_bytes}: measure it.",
-                ShownValue(size, "payload_bytes", "bytes"),
+                blocks.ShownValue(size, "payload_bytes", "bytes"),
             )
     short = [fit for fit in answer.payloads if fit.execution_us <= answer.at_most_us]
     if short:
-        yield sentence(
+        yield blocks.sentence(
             "the bus waits {} before any response, so shorter executions do not show in a latency: T_exec may be "
             f"less at {', '.join(str(fit.payload_bytes) for fit in short)} bytes.",
             time_value(answer.at_most_us, "at_most_us"),
         )
     longest_us = max(fit.execution_us for fit in answer.payloads)
     if longest_us > _LONG_EXECUTION_US:
-        yield sentence(
+        yield blocks.sentence(
             "an execution time of {} is long for a motion node: is latency_us in us?",
-            ShownValue(longest_us, "execution_us", "us", 0),
+            blocks.ShownValue(longest_us, "execution_us", "us", 0),
         )
 
 
-def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> Sentence:
+def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> blocks.Sentence:
     """Sentence on the slow executions, or on the measurements that others contradict, by their lines."""
     count, more = len(outliers), len(outliers) - _MOST_LINES
-    lines = joined(*(_outlier(outlier) for outlier in outliers[:_MOST_LINES]), by=", ")
+    lines = blocks.joined(*(_outlier(outlier) for outlier in outliers[:_MOST_LINES]), by=", ")
     parts = [
-        sentence(f"{{}} {word} {nouns(count, 'measurement')}: ", count_value(count)),
+        blocks.sentence(f"{{}} {word} {nouns(count, 'measurement')}: ", blocks.count_value(count)),
         lines,
-        *([sentence(" and {} more", count_value(more))] if more > 0 else []),
+        *([blocks.sentence(" and {} more", blocks.count_value(more))] if more > 0 else []),
     ]
     if word == "fast":
-        parts.append(sentence("; left out: measure again."))
+        parts.append(blocks.sentence("; left out: measure again."))
     else:
         worst = time_value(worst_us, "worst_extra_us")
-        parts.append(sentence("; left out. The slowest execution takes {} longer, worst_extra_us.", worst))
-    return joined(*parts, by="")
+        parts.append(blocks.sentence("; left out. The slowest execution takes {} longer, worst_extra_us.", worst))
+    return blocks.joined(*parts, by="")
 
 
-def _outlier(outlier: Outlier) -> Sentence:
-    return sentence(
+def _outlier(outlier: Outlier) -> blocks.Sentence:
+    return blocks.sentence(
         "line {} ({} at {}: T_exec {} off the median)",
-        count_value(outlier.line, "line"),
-        ShownValue(outlier.latency_us, "latency_us", "us"),
-        ShownValue(outlier.payload_bytes, "payload_bytes", "bytes"),
+        blocks.count_value(outlier.line, "line"),
+        blocks.ShownValue(outlier.latency_us, "latency_us", "us"),
+        blocks.ShownValue(outlier.payload_bytes, "payload_bytes", "bytes"),
         time_value(outlier.off_us, "off_us")._replace(signed=True, decimals=1),
     )

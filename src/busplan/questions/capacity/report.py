@@ -6,31 +6,16 @@ from typing import Any, Final
 from busplan.buses import figure
 from busplan.buses.figure import BusFigures, Figure
 from busplan.english import nouns
-from busplan.forms.blocks import (
-    Block,
-    Code,
-    Detail,
-    Record,
-    Report,
-    Sentence,
-    State,
-    Table,
-    TableColumn,
-    TableRow,
-    attribute_value,
-    count_value,
-    sentence,
-    state_of,
-)
+from busplan.forms import blocks
 from busplan.forms.numbers import period, sentence_text
-from busplan.questions.base.sentences import FigureColumn, document, fields, figure_table, safety_record, with_profile
+from busplan.questions.base import sentences
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.verdict import Change, Verdict, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS
 
 
-def capacity_report(answer: CapacityAnswer) -> Report:
+def capacity_report(answer: CapacityAnswer) -> blocks.Report:
     """Report of `capacity`; in CSV, figures of a group have columns with its name."""
     name = answer.profile.name
     results, records = [], []
@@ -39,25 +24,25 @@ def capacity_report(answer: CapacityAnswer) -> Report:
         results.append({**result, "groups": list(map(vars, groups))} if groups else result)
         of_groups = {f"group.{group.name}.{key}": getattr(group, key) for group in groups for key in COUNTS}
         records.append({**result, **of_groups})
-    return Report(
-        Sentence(("Capacity of ", Code(name))),
+    return blocks.Report(
+        blocks.Sentence(("Capacity of ", blocks.Code(name))),
         tuple(_blocks(answer)),
-        document(
+        sentences.document(
             "capacity",
             profile=name,
             results=results,
             verdicts=[_verdict(answer, verdict) for verdict in answer.verdicts],
         ),
-        with_profile(name, records),
+        sentences.with_profile(name, records),
     )
 
 
-def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
+def _blocks(answer: CapacityAnswer) -> Iterator[blocks.Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(answer.verdicts, start=1):
         yield verdict.card if number == len(answer.verdicts) else verdict.brief_card
     rests_on = [_rests_on_table(answer.verdicts[-1])] if answer.verdicts[-1].rests_on else []
-    yield Detail((*rests_on, _table(answer), *([_groups_table(answer)] if answer.profile.group else [])))
+    yield blocks.Detail((*rests_on, _table(answer), *([_groups_table(answer)] if answer.profile.group else [])))
 
 
 _GROUP_BY_DECIDING: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
@@ -68,19 +53,19 @@ _CERTAINTY: Final = (figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS)
 _VERDICT: Final = (figure.VERDICT, figure.FITS, *_CERTAINTY, *_GROUP_BY_DECIDING)
 
 
-def _table(answer: CapacityAnswer) -> Table:
+def _table(answer: CapacityAnswer) -> blocks.Table:
     """Figures of all periods, the timing models side by side."""
     first = answer.verdicts[0]
     setup, counts = ", ".join(first.setup), first.counted
-    caption = sentence(
+    caption = blocks.sentence(
         f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup and f'; {setup}'}",
-        *(count_value(number, nouns(2, noun)) for number, noun in counts),
+        *(blocks.count_value(number, nouns(2, noun)) for number, noun in counts),
     )
     rows = [row for row in _rows(first.deciding.bus_figures) if not (answer.profile.group and row[0].key in COUNTS)]
     if not answer.profile.has_cycle:
         results = [figures.values() for figures in answer.results]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
-    return figure_table(
+    return sentences.figure_table(
         rows,
         list(_columns(answer)),
         caption=caption,
@@ -102,7 +87,7 @@ def _rows(register: BusFigures) -> list[tuple[Figure, int]]:
     return [*((row, 0) for row in above), *((term, 1) for term in register.terms), *((row, 0) for row in below)]
 
 
-def _columns(answer: CapacityAnswer) -> Iterator[FigureColumn]:
+def _columns(answer: CapacityAnswer) -> Iterator[sentences.FigureColumn]:
     """A column for each period and timing model, the model that decides first."""
     deciding = answer.verdicts[0].deciding.timing_model
     for results in answer.periods:
@@ -110,14 +95,16 @@ def _columns(answer: CapacityAnswer) -> Iterator[FigureColumn]:
         group = period(results[0].period_us) if several else ""
         for figures in sorted(results, key=lambda figures: figures.timing_model != deciding):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
-            yield FigureColumn(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
+            yield sentences.FigureColumn(
+                blocks.TableColumn(figures.timing_model, group=group, rank=rank), figures.values()
+            )
 
 
-def _state(row: Figure, values: Mapping[str, Any]) -> State:
+def _state(row: Figure, values: Mapping[str, Any]) -> blocks.State:
     """State of a figure that, by itself, decides whether the cycle fits."""
     match row:
         case figure.VERDICT:
-            return "neutral" if values["verdict"] is None else state_of(values["verdict"] == FITS)
+            return "neutral" if values["verdict"] is None else blocks.state_of(values["verdict"] == FITS)
         case figure.MARGIN_CORRECTED:
             needed_us = values["safe_required_us"]
             is_short = needed_us is not None and needed_us > values["available_us"]
@@ -127,56 +114,66 @@ def _state(row: Figure, values: Mapping[str, Any]) -> State:
     return "neutral"
 
 
-def _rests_on_table(verdict: Verdict) -> Table:
+def _rests_on_table(verdict: Verdict) -> blocks.Table:
     """What the profile does not give and the verdict takes for granted."""
-    rows = (TableRow((part.words, Code(part.key) if part.key else "none")) for part in verdict.rests_on)
-    columns = TableColumn("premise", kind="words"), TableColumn("key", kind="words")
-    return Table(columns, tuple(rows), Sentence(("Premises of the verdict that the profile does not give",)))
+    rows = (blocks.TableRow((part.words, blocks.Code(part.key) if part.key else "none")) for part in verdict.rests_on)
+    columns = blocks.TableColumn("premise", kind="words"), blocks.TableColumn("key", kind="words")
+    return blocks.Table(
+        columns, tuple(rows), blocks.Sentence(("Premises of the verdict that the profile does not give",))
+    )
 
 
-def _groups_table(answer: CapacityAnswer) -> Table:
+def _groups_table(answer: CapacityAnswer) -> blocks.Table:
     """How many nodes of each group fit each period, the other groups as they are."""
-    columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
+    columns = [blocks.TableColumn("group", kind="words"), blocks.TableColumn("nodes"), blocks.TableColumn("axes")]
     shown = [
         (figures, _GROUP_BY_OTHER if figures.verdict is None else _GROUP_BY_DECIDING) for figures in answer.results
     ]
     for figures, chosen in shown:
         at = f"{period(figures.period_us)}, " if len(answer.periods) > 1 else ""
         columns += (
-            TableColumn(
+            blocks.TableColumn(
                 column.label, kind="words" if column.sort == "word" else "figures", group=f"{at}{figures.timing_model}"
             )
             for column in chosen
         )
     rows = []
     for place, group in enumerate(answer.results[0].groups):
-        head = (Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes"))
-        cells = (attribute_value(column, figures.groups[place]) for figures, chosen in shown for column in chosen)
-        rows.append(TableRow((*head, *cells)))
-    return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, with the other groups unchanged",)))
+        head = (
+            blocks.Code(group.name),
+            blocks.count_value(group.nodes, "nodes"),
+            blocks.count_value(group.axes, "axes"),
+        )
+        cells = (
+            blocks.attribute_value(column, figures.groups[place]) for figures, chosen in shown for column in chosen
+        )
+        rows.append(blocks.TableRow((*head, *cells)))
+    return blocks.Table(
+        tuple(columns), tuple(rows), blocks.Sentence(("Nodes of each group, with the other groups unchanged",))
+    )
 
 
-def _change_record(change: Change) -> Record:
+def _change_record(change: Change) -> blocks.Record:
     return {
         "changes": change.changes,
         "nodes": change.nodes,
-        **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
+        **sentences.fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
     }
 
 
-def _verdict(answer: CapacityAnswer, verdict: Verdict) -> Record:
+def _verdict(answer: CapacityAnswer, verdict: Verdict) -> blocks.Record:
     change, figures, summary = verdict.change, verdict.deciding, verdict.card.whole
     lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
     return {
         "period_us": verdict.period_us,
-        **fields(figures, "timing_model", "verdict", "fits"),
+        **sentences.fields(figures, "timing_model", "verdict", "fits"),
         "missed_limits": [*dict.fromkeys(missed.key for missed in verdict.missed_limits)],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
-        **safety_record(figures),
-        **fields(figures, "available_us", "required_us", "margin_us"),
-        **fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
+        **sentences.safety_record(figures),
+        **sentences.fields(figures, "available_us", "required_us", "margin_us"),
+        **sentences.fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": answer.profile.limits.reserve,
         "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],

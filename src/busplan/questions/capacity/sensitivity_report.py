@@ -7,24 +7,7 @@ from typing import Final
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, BusFigures, by_key, unit_of
 from busplan.buses.limits import Safety
 from busplan.english import listed, nouns
-from busplan.forms.blocks import (
-    Block,
-    Cell,
-    Chart,
-    Detail,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    Table,
-    TableColumn,
-    TableRow,
-    count_value,
-    figure_value,
-    joined,
-    sentence,
-)
-from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
+from busplan.forms import blocks, charts
 from busplan.forms.numbers import decimals_of, known_decimals, period_value, sentence_text
 from busplan.questions.base.sentences import fields, margin_parts, with_profile
 from busplan.questions.capacity import CapacityAnswer
@@ -38,7 +21,7 @@ _CHANGE_DIGITS: Final = 4
 """Significant digits of a changed value: enough to show a change of 10 %."""
 
 
-def sensitivity_report(answer: CapacityAnswer) -> Report:
+def sensitivity_report(answer: CapacityAnswer) -> blocks.Report:
     """Report of `capacity --sensitivity`."""
     report, sensitivities = capacity_report(answer), answer.sensitivities
     effects = [[_record(effect, at.now.safety) for effect in at.effects] for at in sensitivities]
@@ -63,7 +46,7 @@ def sensitivity_report(answer: CapacityAnswer) -> Report:
     )
 
 
-def _record(effect: Effect, safety: Safety) -> Record:
+def _record(effect: Effect, safety: Safety) -> blocks.Record:
     then, safe = effect.then, safety.figure
     return {
         "change": effect.change,
@@ -77,7 +60,7 @@ def _record(effect: Effect, safety: Safety) -> Record:
     }
 
 
-def _bottleneck_record(bottleneck: NextBottleneck, register: BusFigures) -> Record:
+def _bottleneck_record(bottleneck: NextBottleneck, register: BusFigures) -> blocks.Record:
     """What binds now and next, as data and as a sentence; with groups, their limits are a list."""
     limits = [
         {
@@ -88,7 +71,7 @@ def _bottleneck_record(bottleneck: NextBottleneck, register: BusFigures) -> Reco
         }
         for limit in bottleneck.limits
     ]
-    counts: Record = limits[0]
+    counts: blocks.Record = limits[0]
     if bottleneck.limits[0].group:
         names = [{"name": limit.group} for limit in bottleneck.limits]
         groups = [{**name, **record} for name, record in zip(names, limits, strict=True)]
@@ -104,38 +87,40 @@ def _bottleneck_record(bottleneck: NextBottleneck, register: BusFigures) -> Reco
     }
 
 
-def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
+def _blocks(sensitivity: Sensitivity) -> Iterator[blocks.Block]:
     """Effects of small changes at one period."""
     effects = sensitivity.effects
     yield _table(sensitivity)
     if (drawn := _drawing(sensitivity)) is not None:
         change = _capital(effects[0].change)
         sides = "a bar to the left takes from it, one to the right adds to it"
-        yield Chart(drawn, Sentence((f"{change} moves the corrected margin most; {sides}, in us",)))
+        yield blocks.Chart(drawn, blocks.Sentence((f"{change} moves the corrected margin most; {sides}, in us",)))
     yield _headline(sensitivity)
-    if notes := tuple(Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note):
-        yield Detail(notes, "why some changes have no effect")
+    if notes := tuple(
+        blocks.Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note
+    ):
+        yield blocks.Detail(notes, "why some changes have no effect")
     yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.now.bus_figures)
     if sensitivity.reaches:
         yield _reaches_table(sensitivity.reaches)
 
 
-def _table(sensitivity: Sensitivity) -> Table:
+def _table(sensitivity: Sensitivity) -> blocks.Table:
     """Every change with what it does to the margin, the largest effect first."""
-    caption = sentence(
+    caption = blocks.sentence(
         f"What moves the corrected margin of {{}} at {{}}, by the {sensitivity.now.timing_model} model",
         margin_parts(sensitivity.now)[0],
         period_value(sensitivity.now.period_us),
     )
     columns = (
-        TableColumn("what changes", kind="words"),
-        TableColumn("from -> to", kind="words", rank=1),
-        TableColumn("change", "us", group="corrected margin"),
-        TableColumn("then", "us", group="corrected margin"),
-        TableColumn("verdict then", kind="words", wraps=True),
+        blocks.TableColumn("what changes", kind="words"),
+        blocks.TableColumn("from -> to", kind="words", rank=1),
+        blocks.TableColumn("change", "us", group="corrected margin"),
+        blocks.TableColumn("then", "us", group="corrected margin"),
+        blocks.TableColumn("verdict then", kind="words", wraps=True),
     )
     rows = (
-        TableRow(
+        blocks.TableRow(
             (
                 effect.change,
                 _step(effect),
@@ -147,69 +132,71 @@ def _table(sensitivity: Sensitivity) -> Table:
         )
         for effect in sensitivity.effects
     )
-    return Table(columns, tuple(rows), caption)
+    return blocks.Table(columns, tuple(rows), caption)
 
 
-def _change_value(effect: Effect, sensitivity: Sensitivity) -> ShownValue:
+def _change_value(effect: Effect, sensitivity: Sensitivity) -> blocks.ShownValue:
     """What a change takes from the margin, in the digits that the margin has."""
     change_us, now = effect.margin_change_us, sensitivity.now
     decimals = min(_DECIMALS, max(0, known_decimals(change_us or 0.0, now.uncertainty_us)))
-    return ShownValue(change_us, "margin_change_us", "us", decimals, signed=True)
+    return blocks.ShownValue(change_us, "margin_change_us", "us", decimals, signed=True)
 
 
-def _then_value(effect: Effect) -> ShownValue:
+def _then_value(effect: Effect) -> blocks.ShownValue:
     """The margin after a change, in the digits that its uncertainty allows."""
     margin_us, uncertainty_us = None, None
     if effect.then is not None:
         margin_us, uncertainty_us = effect.then.margin_corrected_us, effect.then.uncertainty_us
     decimals = known_decimals(margin_us or 0.0, uncertainty_us)
-    return figure_value(MARGIN_CORRECTED, margin_us)._replace(decimals=min(_DECIMALS, max(0, decimals)))
+    return blocks.figure_value(MARGIN_CORRECTED, margin_us)._replace(decimals=min(_DECIMALS, max(0, decimals)))
 
 
-def _reaches_table(reaches: Sequence[Reach]) -> Table:
+def _reaches_table(reaches: Sequence[Reach]) -> blocks.Table:
     """How far each quantity may grow."""
     columns = (
-        TableColumn("quantity", kind="words"),
-        TableColumn("now"),
-        TableColumn("up to"),
-        TableColumn("then broken", kind="words"),
+        blocks.TableColumn("quantity", kind="words"),
+        blocks.TableColumn("now"),
+        blocks.TableColumn("up to"),
+        blocks.TableColumn("then broken", kind="words"),
     )
     rows = (
-        TableRow(
+        blocks.TableRow(
             (
                 reach.quantity,
-                ShownValue(reach.now, reach.key, digits=_CHANGE_DIGITS),
-                ShownValue(reach.most, reach.key, digits=_CHANGE_DIGITS),
+                blocks.ShownValue(reach.now, reach.key, digits=_CHANGE_DIGITS),
+                blocks.ShownValue(reach.most, reach.key, digits=_CHANGE_DIGITS),
                 ", ".join(reach.limited_by) or "nothing",
             )
         )
         for reach in reaches
     )
-    return Table(columns, tuple(rows), Sentence(("Largest value of each quantity alone before a limit breaks",)))
+    return blocks.Table(
+        columns, tuple(rows), blocks.Sentence(("Largest value of each quantity alone before a limit breaks",))
+    )
 
 
-def _step(effect: Effect) -> Cell:
+def _step(effect: Effect) -> blocks.Cell:
     """The value before and after; nothing if the change has no single value."""
     if effect.before is None or effect.after is None:
         return ""
-    before = ShownValue(effect.before, effect.key, digits=_CHANGE_DIGITS)
-    after = ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_CHANGE_DIGITS)
-    return sentence("{} -> {}", before, after)
+    before = blocks.ShownValue(effect.before, effect.key, digits=_CHANGE_DIGITS)
+    after = blocks.ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_CHANGE_DIGITS)
+    return blocks.sentence("{} -> {}", before, after)
 
 
-def _verdict(then: FitFigures | None) -> Cell:
+def _verdict(then: FitFigures | None) -> blocks.Cell:
     """The verdict with the broken limits, or with the setting that is unsafe."""
     if then is None:
-        return figure_value(VERDICT, None)
+        return blocks.figure_value(VERDICT, None)
     why = list(then.behind)
     is_well = then.verdict == FITS and then.safe
     if not why and then.verdict == FITS and not then.safe:
         why = [f"unsafe {then.safety.setting}"]
-    shown = figure_value(VERDICT, then.verdict)
-    return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if is_well else "fails")
+    shown = blocks.figure_value(VERDICT, then.verdict)
+    return blocks.Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if is_well else "fails")
 
 
-def _drawing(sensitivity: Sensitivity) -> Drawing | None:
+def _drawing(sensitivity: Sensitivity) -> charts.Drawing | None:
     """A bar for each change that can be made, on one scale; None if nothing moves the margin."""
     moved = [(effect.change, effect.margin_change_us) for effect in sensitivity.effects]
     changes = [(change, us) for change, us in moved if us is not None]
@@ -218,37 +205,39 @@ def _drawing(sensitivity: Sensitivity) -> Drawing | None:
     if least == most:
         return None
     lanes = tuple(
-        Lane(change, tuple(_bar(us)), f"{decimals_of(us, _DECIMALS, signed=True)} us", is_thin=True)
+        charts.Lane(change, tuple(_bar(us)), f"{decimals_of(us, _DECIMALS, signed=True)} us", is_thin=True)
         for change, us in changes
     )
-    guides = [Guide(Entry("zero"), x=0.0)]
+    guides = [charts.Guide(charts.Entry("zero"), x=0.0)]
     if least <= -left_us < 0:
-        guides.append(Guide(Entry("edge", "nothing is left of the corrected margin", shape="line"), x=-left_us))
+        guides.append(
+            charts.Guide(charts.Entry("edge", "nothing is left of the corrected margin", shape="line"), x=-left_us)
+        )
     title = "What each small change does to the corrected margin"
-    return Drawing(title, (Panel(Lanes(numbers("us", least, most), lanes, tuple(guides))),))
+    return charts.Drawing(title, (charts.Panel(charts.Lanes(charts.numbers("us", least, most), lanes, tuple(guides))),))
 
 
-def _bar(us: float) -> Iterator[Span]:
+def _bar(us: float) -> Iterator[charts.Span]:
     if us < 0:
-        yield Span(Entry("takes", "takes from the corrected margin"), us, 0.0)
+        yield charts.Span(charts.Entry("takes", "takes from the corrected margin"), us, 0.0)
     elif us > 0:
-        yield Span(Entry("hides", "adds to it"), 0.0, us)
+        yield charts.Span(charts.Entry("hides", "adds to it"), 0.0, us)
 
 
-def _headline(sensitivity: Sensitivity) -> Sentence:
+def _headline(sensitivity: Sensitivity) -> blocks.Sentence:
     """Say which change moves the margin most, and after which ones the cycle no longer fits or the bus is unsafe."""
     first = sensitivity.effects[0]
     if not first.margin_change_us:
-        return Sentence(("None of these changes moves the corrected margin.",))
-    most = sentence(
+        return blocks.Sentence(("None of these changes moves the corrected margin.",))
+    most = blocks.sentence(
         f"{_capital(first.change)} moves the corrected margin most, by {{}} to {{}}.",
         _change_value(first, sensitivity),
         _then_value(first),
     )
-    return joined(most, *_after_each(sensitivity))
+    return blocks.joined(most, *_after_each(sensitivity))
 
 
-def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
+def _after_each(sensitivity: Sensitivity) -> Iterator[blocks.Sentence]:
     """Say after which changes a cycle that is shown to fit no longer is, or its bus is unsafe."""
     if sensitivity.now.verdict != FITS:
         return
@@ -256,42 +245,44 @@ def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
     lost = [change for change, then in made if then.verdict != FITS]
     unsafe = [change for change, then in made if then.verdict == FITS and sensitivity.now.safe and not then.safe]
     if lost:
-        yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
+        yield blocks.Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {sensitivity.now.safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
+        yield blocks.Sentence((f"Its {sensitivity.now.safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
-        yield Sentence(("The cycle is shown to fit after each of them alone.",))
+        yield blocks.Sentence(("The cycle is shown to fit after each of them alone.",))
 
 
-def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> Sentence:
+def _bottleneck_sentence(bottleneck: NextBottleneck, register: BusFigures) -> blocks.Sentence:
     """Say what binds once the largest term, or the limit of the nodes, is gone."""
     now, next_term = bottleneck.binding_term, bottleneck.next_binding_term
     labels = by_key(register.terms)
     label, next_label = labels[now.key].label, labels[next_term.key].label
-    us = ShownValue(now.us, "binding_term_us", "us", known_decimals(now.us, None))
-    next_us = ShownValue(next_term.us, "next_binding_term_us", "us", known_decimals(next_term.us, None))
+    us = blocks.ShownValue(now.us, "binding_term_us", "us", known_decimals(now.us, None))
+    next_us = blocks.ShownValue(next_term.us, "next_binding_term_us", "us", known_decimals(next_term.us, None))
     if bottleneck.next_margin_corrected_us is not None:
         margin_us = bottleneck.next_margin_corrected_us
-        margin = ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))
+        margin = blocks.ShownValue(margin_us, "next_margin_corrected_us", "us", known_decimals(margin_us, None))
         text = (
             f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, "
             "and the corrected margin {}"
         )
-        of_term = sentence(text, us, next_us, margin)
+        of_term = blocks.sentence(text, us, next_us, margin)
     else:
         then = f"the next term is {next_label}, {{}}"
-        of_term = sentence(f"Next bottleneck: no key removes {label}, {{}}; {then}", us, next_us)
-    return joined(joined(of_term, *map(_limit, bottleneck.limits), by="; "), Sentence((".",)), by="")
+        of_term = blocks.sentence(f"Next bottleneck: no key removes {label}, {{}}; {then}", us, next_us)
+    return blocks.joined(
+        blocks.joined(of_term, *map(_limit, bottleneck.limits), by="; "), blocks.Sentence((".",)), by=""
+    )
 
 
-def _limit(limit: NextLimit) -> Sentence:
+def _limit(limit: NextLimit) -> blocks.Sentence:
     """Say what limits the nodes, or those of a group, now and next."""
     of = f" of {limit.group}" if limit.group else ""
-    return sentence(
+    return blocks.sentence(
         f"without the limit of {limit.limited_by}, now at {{}} {nouns(limit.safe_nodes, 'node')}{of}, the next limit "
         f"is {limit.next_limited_by}, at {{}} {nouns(limit.next_safe_nodes, 'node')}",
-        count_value(limit.safe_nodes, SAFE_NODES.key),
-        count_value(limit.next_safe_nodes, "next_safe_nodes"),
+        blocks.count_value(limit.safe_nodes, SAFE_NODES.key),
+        blocks.count_value(limit.next_safe_nodes, "next_safe_nodes"),
     )
 
 

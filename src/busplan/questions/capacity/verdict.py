@@ -13,18 +13,11 @@ from busplan.buses.rule import contradicts
 from busplan.elementwise import FIT_ROUNDING
 from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
+from busplan.forms import blocks
 from busplan.forms.numbers import known_decimals, known_text, period
 from busplan.profile.edit import short_text
 from busplan.progress import Progress, ignored
-from busplan.questions.base.sentences import (
-    change_meanings,
-    checked_against,
-    never_measured,
-    settings_sentence,
-    time_lines,
-    used_us,
-)
+from busplan.questions.base import sentences
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_to_fit
 from busplan.questions.fit.cure import NODES, AtPeriod, Changes, Cure, SettingForPeriod, Variants, cure
 from busplan.questions.fit.figures import (
@@ -54,7 +47,7 @@ class Change:
     """Figures after the change, under the model that decides."""
 
 
-_BLANK: Final = Card(Sentence(()), Words(""), None, ())
+_BLANK: Final = blocks.Card(blocks.Sentence(()), blocks.Words(""), None, ())
 
 
 @dataclass(frozen=True)
@@ -94,9 +87,9 @@ class Verdict:
     or if no change is enough."""
     no_change: str
     """Why there is no change, if one was looked for."""
-    card: Card = _BLANK
+    card: blocks.Card = _BLANK
     """Subject, verdict and the lines that sum it up; they are written from the rest of the verdict."""
-    brief_card: Card = _BLANK
+    brief_card: blocks.Card = _BLANK
     """The same without the lines that are alike for every period."""
 
     @property
@@ -238,10 +231,12 @@ def _refusal(network: Network, changes: Changes) -> str:
 
 _CARD_WORDS: Final = 62
 """Most characters of what the verdict rests on in a line of the card."""
-_Line = tuple[str, Sentence]
+_Line = tuple[str, blocks.Sentence]
 
 
-def _cards(verdict: Verdict, network: Network, *, bus_lines: Iterable[tuple[str, str]]) -> tuple[Card, Card]:
+def _cards(
+    verdict: Verdict, network: Network, *, bus_lines: Iterable[tuple[str, str]]
+) -> tuple[blocks.Card, blocks.Card]:
     """Sum up the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
 
     The second card is without the lines that are alike for every period.
@@ -250,35 +245,35 @@ def _cards(verdict: Verdict, network: Network, *, bus_lines: Iterable[tuple[str,
     if network.groups:
         counts.append(period(verdict.period_us))
     title = network.bus.title_of(network)
-    subject = Sentence((Code(network.profile.name), f"  {title}, {', '.join(counts)}"))
+    subject = blocks.Sentence((blocks.Code(network.profile.name), f"  {title}, {', '.join(counts)}"))
     first = (
         *_reasons(verdict),
         *(_times(verdict, network) if network.groups else ()),
-        *((label, Sentence((words,))) for label, words in bus_lines),
+        *((label, blocks.Sentence((words,))) for label, words in bus_lines),
         *_room(verdict, network),
         *_buses(verdict, network.bus),
     )
     last = tuple(_caveats(verdict))
-    brief = Card(subject, _word(verdict), _gauge(verdict, network), (*first, *last))
+    brief = blocks.Card(subject, _word(verdict), _gauge(verdict, network), (*first, *last))
     tested = parts_tested(network.bus.evidence_for(network))
     basis, details = tuple(_basis(verdict, network, tested)), tuple(_details(verdict, network, tested))
     return brief._replace(lines=(*first, *basis, *last), details=details), brief
 
 
-def _word(verdict: Verdict) -> Words:
+def _word(verdict: Verdict) -> blocks.Words:
     word = verdict.deciding.verdict
     but = "" if verdict.all_well or word != FITS else ", BUT"
-    state: State = "passes" if verdict.all_well else "fails" if word == DOES_NOT_FIT or but else "warns"
-    return Words(f"{(word or '').upper()}{but}", state)
+    state: blocks.State = "passes" if verdict.all_well else "fails" if word == DOES_NOT_FIT or but else "warns"
+    return blocks.Words(f"{(word or '').upper()}{but}", state)
 
 
-def _gauge(verdict: Verdict, network: Network) -> Gauge | None:
+def _gauge(verdict: Verdict, network: Network) -> blocks.Gauge | None:
     figures = verdict.deciding
-    state: State = "passes" if figures.verdict == FITS else "fails"
+    state: blocks.State = "passes" if figures.verdict == FITS else "fails"
     if network.groups:
-        available_us, whole_us = figures.available_us, max(figures.period_us, used_us(figures))
-        return Gauge(
-            used=used_us(figures) / whole_us,
+        available_us, whole_us = figures.available_us, max(figures.period_us, sentences.used_us(figures))
+        return blocks.Gauge(
+            used=sentences.used_us(figures) / whole_us,
             doubt=(figures.uncertainty_us or 0.0) / whole_us,
             free_until=available_us * (1 - network.profile.limits.reserve) / whole_us,
             most=available_us / whole_us,
@@ -289,27 +284,27 @@ def _gauge(verdict: Verdict, network: Network) -> Gauge | None:
         return None
     load, most = limit.value(network), limit.most(network)
     whole = max(1.0, load)
-    return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
+    return blocks.Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 
 
 def _reasons(verdict: Verdict) -> Iterator[_Line]:
     """Reasons other than time why the machine does not run as the profile has it."""
     for words in verdict.broken_limits:
-        yield "limit", Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
+        yield "limit", blocks.Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
     if not verdict.deciding.safe:
-        yield "unsafe", Sentence((verdict.deciding.safety.setting,), "fails")
+        yield "unsafe", blocks.Sentence((verdict.deciding.safety.setting,), "fails")
     if verdict.deciding.verdict == FITS:
         # Of several groups with too little room, the first.
         first = {missed.key: missed.words for missed in reversed(verdict.missed_limits)}
-        yield from (("[limits]", Sentence((words,), "fails")) for words in reversed(first.values()))
+        yield from (("[limits]", blocks.Sentence((words,), "fails")) for words in reversed(first.values()))
 
 
 def _times(verdict: Verdict, network: Network) -> Iterator[_Line]:
-    yield from time_lines(verdict.deciding, network.profile)
+    yield from sentences.time_lines(verdict.deciding, network.profile)
     yield "fastest period", _fastest(verdict, network.bus)
 
 
-def _fastest(verdict: Verdict, bus: Bus) -> Sentence:
+def _fastest(verdict: Verdict, bus: Bus) -> blocks.Sentence:
     fastest, best = verdict.fastest, verdict.best_register
     with_best = ""
     if best is not None:
@@ -318,10 +313,10 @@ def _fastest(verdict: Verdict, bus: Bus) -> Sentence:
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
         none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
-        return Sentence((f"none{with_best}" if best else none,), "fails")
+        return blocks.Sentence((f"none{with_best}" if best else none,), "fails")
     key = fastest.need.key
     limited = "" if key == TIME else f", limited by {_limit_label(bus, key)}"
-    return Sentence((f"{_rounded_up(verdict, fastest.us, bus)}{limited}{with_best}",))
+    return blocks.Sentence((f"{_rounded_up(verdict, fastest.us, bus)}{limited}{with_best}",))
 
 
 def _limit_label(bus: Bus, key: str | None) -> str:
@@ -344,22 +339,22 @@ def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
     if verdict.all_well and verdict.has_room:
         spare = [(count, (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
         rooms = [_more(count, number) for count, number in spare if number > 0]
-        yield "room for", Sentence((listed(rooms, "or"),))
+        yield "room for", blocks.Sentence((listed(rooms, "or"),))
         return
     if verdict.all_well and network.groups:
-        yield "room for", Sentence(("no more nodes",))
+        yield "room for", blocks.Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
         if verdict.no_change:
             rest = _beside_limit(verdict, verdict.no_change)
             why = verdict.no_change if rest is None else rest
-            yield label, Sentence((f"none: {why}" if why else "none",))
+            yield label, blocks.Sentence((f"none: {why}" if why else "none",))
         return
-    meanings = change_meanings(network.bus)
-    settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
+    meanings = sentences.change_meanings(network.bus)
+    settings = sentences.settings_sentence(change.changes, meanings=meanings, quotes=False)
     left_us = change.figures.margin_corrected_us
     left = "" if left_us is None else f", which leaves {known_text(left_us, change.figures.uncertainty_us)} us"
-    yield label, joined(settings, Sentence((left,)), by="")
+    yield label, blocks.joined(settings, blocks.Sentence((left,)), by="")
 
 
 def _more(count: GroupCapacity, number: int) -> str:
@@ -400,10 +395,13 @@ def _buses(verdict: Verdict, bus: Bus) -> Iterator[_Line]:
     figures = verdict.deciding
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
-        yield "buses", Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
+        yield (
+            "buses",
+            blocks.Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",)),
+        )
     elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups and not verdict.change:
         limit = _limit_label(bus, figures.safe_limited_by)
-        yield "buses", Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
+        yield "buses", blocks.Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
 
 
 def _basis(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
@@ -412,19 +410,22 @@ def _basis(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line
     if figures.terms:
         largest = max(figures.terms, key=lambda term: term.us)
         us = known_text(largest.us, figures.uncertainty_us)
-        yield "largest term", Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
+        yield "largest term", blocks.Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
     parts = uncertainty_parts(figures)
     if parts and parts[0]["share"]:
         part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, +/- {known_text(part_us, figures.uncertainty_us)} us",))
+        yield (
+            "largest doubt",
+            blocks.Sentence((f"{parts[0]['label']}, +/- {known_text(part_us, figures.uncertainty_us)} us",)),
+        )
     if network.groups and figures.uncertainty_us is None:
-        yield "doubt", Sentence(("not known",), "warns")
+        yield "doubt", blocks.Sentence(("not known",), "warns")
     if verdict.assumptions:
-        yield "assumed", Sentence((_assumed_words(verdict.assumptions),), "warns")
+        yield "assumed", blocks.Sentence((_assumed_words(verdict.assumptions),), "warns")
     if verdict.rests_on:
-        yield "rests on", Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
-    if network.groups and (never := never_measured(tested)):
-        yield "never measured", Sentence((never,))
+        yield "rests on", blocks.Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
+    if network.groups and (never := sentences.never_measured(tested)):
+        yield "never measured", blocks.Sentence((never,))
 
 
 def _assumed_words(assumptions: Sequence[HeavyAssumption]) -> str:
@@ -444,13 +445,13 @@ def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Li
     figures = verdict.deciding
     if figures.bias_us:
         words = "included in used: measured buses take this much longer than the timing model"
-        yield "correction", Sentence((f"{known_text(figures.bias_us, None)} us {words}",))
+        yield "correction", blocks.Sentence((f"{known_text(figures.bias_us, None)} us {words}",))
     elif network.groups and figures.bias_us is None:
         (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
-        yield "correction", Sentence((f"none: {error}",))
-    yield "checked against", Sentence((checked_against(tested, with_untested=False),))
+        yield "correction", blocks.Sentence((f"none: {error}",))
+    yield "checked against", blocks.Sentence((sentences.checked_against(tested, with_untested=False),))
     for model, missing in verdict.not_applicable.items():
-        yield f"{model} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
+        yield f"{model} model", blocks.Sentence((f"not applicable: it has no {', '.join(missing)}",))
 
 
 def _caveats(verdict: Verdict) -> Iterator[_Line]:
@@ -462,14 +463,14 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
             fits = "fits" if other.fits else "does not fit"
             words = f"{fits}: {needed_us} us of {known_text(other.available_us, None)}"
             decides = f"; the {deciding.timing_model} model decides"
-            yield f"{other.timing_model} model", Sentence((f"{words}{decides}",), "warns")
+            yield f"{other.timing_model} model", blocks.Sentence((f"{words}{decides}",), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in verdict.after_reset.safety.after_reset.items())
-        yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
-    yield from (("beware", Sentence((warning,), "warns")) for warning in verdict.warnings)
+        yield "bus reset", blocks.Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
+    yield from (("beware", blocks.Sentence((warning,), "warns")) for warning in verdict.warnings)
 
 
-def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
+def uncertainty_parts(figures: CapacityFigures) -> list[blocks.Record]:
     """Components of the uncertainty, the largest first."""
     whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [

@@ -6,21 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.forms.charts import (
-    Curve,
-    Curves,
-    Dial,
-    Drawing,
-    Entry,
-    Guide,
-    Lane,
-    Lanes,
-    Panel,
-    Ruler,
-    Shade,
-    Span,
-    numbers,
-)
+from busplan.forms import charts
 from busplan.forms.lines import Tone
 from busplan.forms.numbers import ROUNDING_UM, decimals_of, period
 from busplan.forms.scale import ring_step
@@ -37,7 +23,7 @@ _WIDEST: Final = 3.0
 _FLAT: Final = 0.1
 """Smallest spread of the errors, as a share of the largest, drawn with zero; less would look like one line."""
 _NANOMETRES_BELOW_UM: Final = 0.1
-TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
+TOLERANCE: Final = charts.Entry("tolerance", "tolerance of the largest error", shape="line")
 
 
 class LengthUnit(NamedTuple):
@@ -148,18 +134,18 @@ def error_range(low_um: float, high_um: float) -> ErrorRange:
     return ErrorRange(min(0.0, low_um), max(0.0, high_um))
 
 
-def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dial:
+def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> charts.Dial:
     """Nominal circle, rings, tolerance, and the path with its error magnified, from the positive x axis on."""
     low, high = (
         tuple(None if error is None else scale.radius(error) for error in errors)
         for errors in (contour.low_mm, contour.high_mm)
     )
-    rings = [(scale.radius(error), Entry("ring")) for error in scale.rings_mm if error]
-    rings.append((1.0, Entry("nominal", "nominal circle", shape="line")))
+    rings = [(scale.radius(error), charts.Entry("ring")) for error in scale.rings_mm if error]
+    rings.append((1.0, charts.Entry("nominal", "nominal circle", shape="line")))
     if scale.tolerance_mm is not None:
         rings += [(scale.radius(error), TOLERANCE) for error in (-scale.tolerance_mm, scale.tolerance_mm)]
-    path = Entry("first", "path with magnified error", shape="line")
-    return Dial(path, low, high, tuple(rings), (scale.ring_text, "per ring"), direction == "cw")
+    path = charts.Entry("first", "path with magnified error", shape="line")
+    return charts.Dial(path, low, high, tuple(rings), (scale.ring_text, "per ring"), direction == "cw")
 
 
 class _Row(NamedTuple):
@@ -209,7 +195,7 @@ _TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: 
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
-def circle_drawing(test: CircleTestAnswer) -> Drawing:
+def circle_drawing(test: CircleTestAnswer) -> charts.Drawing:
     """Drawing of each simulated period, at least one, on the same scales, one below the other."""
     simulated = zip(test.results, test.runs, test.shapes, strict=True)
     rows = [_Row(result, run, shape) for result, run, shape in simulated if run is not None and shape is not None]
@@ -223,10 +209,10 @@ def circle_drawing(test: CircleTestAnswer) -> Drawing:
         panel for row in rows for panel in (_circle(row, scales), _errors(row, scales), _ranking(row, rows, scales))
     )
     description = f"Circle test of {test.profile.name}"
-    return Drawing(test.profile.name, tuple(panel for panel in panels if panel), tuple(words), description)
+    return charts.Drawing(test.profile.name, tuple(panel for panel in panels if panel), tuple(words), description)
 
 
-def _circle(row: _Row, scales: _Scales) -> Panel:
+def _circle(row: _Row, scales: _Scales) -> charts.Panel:
     """Setup, verdict, and the circle on the scale of all periods."""
     result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
@@ -236,7 +222,7 @@ def _circle(row: _Row, scales: _Scales) -> Panel:
     plot = None
     if scale is not None and row.shape.contour is not None:
         plot = dial(row.shape.contour, scale, row.run.path.direction)
-    return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
+    return charts.Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
 
 
 def _shown(row: _Row, scales: _Scales) -> str:
@@ -256,38 +242,42 @@ def _measure_text(value_mm: float | None, limit_mm: float | None, scales: _Scale
     return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
 
 
-def _errors(row: _Row, scales: _Scales) -> Panel:
+def _errors(row: _Row, scales: _Scales) -> charts.Panel:
     """Contour error over time, with mean and maximum above; the measured part is strong and shaded."""
     errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
     result, limit_mm = row.result, tolerance.max_contour_error_mm
     mean = _measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
     largest = _measure_text(result.max_contour_error_mm, limit_mm, scales)
     label = ", ".join(filter(None, (f"contour error [{scales.unit.name}]", errors.zero_outside)))
-    up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
-    guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
+    up = charts.numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
+    guides = [] if errors.zero_outside else [charts.Guide(charts.Entry("zero"), y=0.0)]
     limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
-    guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
+    guides += [charts.Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
     curves = tuple(_curve(part, up, row, per_um=per_um) for part in row.shape.parts)
-    during = (Shade(Entry("during"), *part.time_s[[0, -1]].tolist()) for part in row.shape.parts if part.measured)
-    across = numbers("time [s]", 0.0, float(row.shape.parts[-1].time_s[-1]))
-    return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
+    during = (
+        charts.Shade(charts.Entry("during"), *part.time_s[[0, -1]].tolist())
+        for part in row.shape.parts
+        if part.measured
+    )
+    across = charts.numbers("time [s]", 0.0, float(row.shape.parts[-1].time_s[-1]))
+    return charts.Panel(charts.Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 
 
-def _curve(part: ErrorPart, up: Ruler, row: _Row, *, per_um: float) -> Curve:
+def _curve(part: ErrorPart, up: charts.Ruler, row: _Row, *, per_um: float) -> charts.Curve:
     """Error curve of a part of the move. Errors far off the scale are clipped: nothing draws huge numbers."""
     spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
     errors = np.clip(part.error_um * per_um, up.low - spread, up.high + spread)
     if part.measured:
-        entry = Entry(
+        entry = charts.Entry(
             "first", "measured: one whole turn" if is_turn else "measured: arc at constant speed", shape="line"
         )
     else:
         words = "not measured: lead-in and ramps" if is_turn else "not measured: ramps and settling"
-        entry = Entry("apart", words, shape="line")
-    return Curve(entry, tuple(zip(part.time_s.tolist(), errors.tolist(), strict=True)))
+        entry = charts.Entry("apart", words, shape="line")
+    return charts.Curve(entry, tuple(zip(part.time_s.tolist(), errors.tolist(), strict=True)))
 
 
-def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
+def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> charts.Panel | None:
     """Shares of the error sources in the largest error, the largest first.
 
     Periods whose table followed the circle share one scale, all others a second.
@@ -300,10 +290,10 @@ def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
     lanes = []
     for source in row.result.contributions:
         value = source.removed_mm * 1e3 * unit.per_um
-        bar = Span(Entry("takes" if value >= 0 else "hides"), min(value, 0.0), max(value, 0.0))
+        bar = charts.Span(charts.Entry("takes" if value >= 0 else "hides"), min(value, 0.0), max(value, 0.0))
         note = f"{decimals_of(value, 3, signed=True)} {unit.name}"
-        lanes.append(Lane(source.source.replace("_", " "), (bar,), note, is_thin=True))
+        lanes.append(charts.Lane(source.source.replace("_", " "), (bar,), note, is_thin=True))
     low, high = min(0.0, *taken), max(0.0, *taken)
-    scale = numbers(unit.name, low, high if high > low else low + 1.0)
+    scale = charts.numbers(unit.name, low, high if high > low else low + 1.0)
     title = "Increase of the largest error by each source"
-    return Panel(Lanes(scale, tuple(lanes), (Guide(Entry("zero"), x=0.0),)), title)
+    return charts.Panel(charts.Lanes(scale, tuple(lanes), (charts.Guide(charts.Entry("zero"), x=0.0),)), title)

@@ -6,26 +6,7 @@ from typing import Final
 
 from busplan.buses.figure import SAFE_AXES, VERDICT, Ink
 from busplan.english import listed, nouns, plural
-from busplan.forms.blocks import (
-    Block,
-    Cell,
-    Chart,
-    Code,
-    Detail,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    Table,
-    TableColumn,
-    TableRow,
-    Words,
-    count_value,
-    joined,
-    sentence,
-    state_of,
-)
-from busplan.forms.charts import Curve, Curves, Drawing, Entry, Guide, Panel, letters, logarithmic
+from busplan.forms import blocks, charts
 from busplan.forms.numbers import period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.edit import short_text
@@ -46,20 +27,20 @@ _INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "ackno
 _LEAST_TOP: Final = 10
 _CAPTION: Final = "Most axes that are shown to fit over the period, both logarithmic"
 _COLUMNS: Final = (
-    TableColumn("bus", kind="words", wraps=True),
-    TableColumn("smallest period", "us"),
-    TableColumn("most", group="safe axes"),
-    TableColumn("limited by", kind="words", group="safe axes", rank=3, wraps=True),
-    TableColumn(VERDICT.label, kind="words", wraps=True),
-    TableColumn("margin", "us"),
-    TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
-    TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True, is_detail=True),
+    blocks.TableColumn("bus", kind="words", wraps=True),
+    blocks.TableColumn("smallest period", "us"),
+    blocks.TableColumn("most", group="safe axes"),
+    blocks.TableColumn("limited by", kind="words", group="safe axes", rank=3, wraps=True),
+    blocks.TableColumn(VERDICT.label, kind="words", wraps=True),
+    blocks.TableColumn("margin", "us"),
+    blocks.TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True, is_detail=True),
+    blocks.TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True, is_detail=True),
 )
 _ASSUMED: Final = (
-    TableColumn("bus", kind="words"),
-    TableColumn("key", kind="words", wraps=True),
-    TableColumn("value", wraps=True),
-    TableColumn("from", kind="words"),
+    blocks.TableColumn("bus", kind="words"),
+    blocks.TableColumn("key", kind="words", wraps=True),
+    blocks.TableColumn("value", wraps=True),
+    blocks.TableColumn("from", kind="words"),
 )
 _FIGURES: Final = (
     *("timing_model", "verdict", "safe", "exceeded", "not_shown", "available_us", "required_us"),
@@ -68,11 +49,11 @@ _FIGURES: Final = (
 _SAFE: Final = ("safe_nodes", "safe_axes", "safe_limited_by")
 
 
-def compare_report(answer: CompareAnswer) -> Report:
+def compare_report(answer: CompareAnswer) -> blocks.Report:
     """Report of `compare`: how many kinds carry the machine, their figures, the picture, and what each rests on."""
     records = [_record(machine) for machine in answer.kinds]
-    return Report(
-        Sentence((Code(answer.profile.name), " on each kind of bus")),
+    return blocks.Report(
+        blocks.Sentence((blocks.Code(answer.profile.name), " on each kind of bus")),
         tuple(_blocks(answer)),
         document(
             "compare",
@@ -87,37 +68,39 @@ def compare_report(answer: CompareAnswer) -> Report:
     )
 
 
-def _blocks(answer: CompareAnswer) -> Iterator[Block]:
+def _blocks(answer: CompareAnswer) -> Iterator[blocks.Block]:
     summary = _headline(answer)
     yield summary
     yield from _best(answer)
     if answer.counted:
-        yield sentence("Axes are counted with more nodes of {}, with the other groups unchanged.", Code(answer.counted))
+        yield blocks.sentence(
+            "Axes are counted with more nodes of {}, with the other groups unchanged.", blocks.Code(answer.counted)
+        )
     if any(not machine.is_own for machine in answer.compared):
         words = "On other kinds of bus the machine has the bus of a new profile, with assumed values."
-        yield Sentence((words,), "warns")
-    yield Table(_COLUMNS, tuple(map(_row, answer.kinds)), Sentence(("The machine on each kind of bus",)))
+        yield blocks.Sentence((words,), "warns")
+    yield blocks.Table(_COLUMNS, tuple(map(_row, answer.kinds)), blocks.Sentence(("The machine on each kind of bus",)))
     if answer.compared:
-        yield Chart(_drawing(answer, title=sentence_text(summary)), Sentence((_CAPTION,)))
+        yield blocks.Chart(_drawing(answer, title=sentence_text(summary)), blocks.Sentence((_CAPTION,)))
     yield from filter(None, (_hindrance(machine) for machine in answer.kinds))
     notes = (*map(_note, answer.compared), *_left_out(answer))
-    yield Detail(notes, "what each kind leaves out, assumes and was checked against")
+    yield blocks.Detail(notes, "what each kind leaves out, assumes and was checked against")
     yield from answer.execution
     assumed = [(machine, assumption) for machine in answer.compared for assumption in machine.assumed]
     if assumed:
         rows = (
-            TableRow(
-                (machine.title, Code(assumption.key), short_text(assumption.value), assumption.source),
+            blocks.TableRow(
+                (machine.title, blocks.Code(assumption.key), short_text(assumption.value), assumption.source),
             )
             for machine, assumption in assumed
         )
         caption = (
             "Assumed, by the profile, as a new profile of the kind has it or by default, until somebody knows better"
         )
-        yield Detail((Table(_ASSUMED, tuple(rows), Sentence((caption,))),))
+        yield blocks.Detail((blocks.Table(_ASSUMED, tuple(rows), blocks.Sentence((caption,))),))
 
 
-def _headline(answer: CompareAnswer) -> Sentence:
+def _headline(answer: CompareAnswer) -> blocks.Sentence:
     """Say what the profile's own bus does, and on which others the machine is shown to fit, with what is assumed."""
     own = next((machine for machine in answer.compared if machine.is_own), None)
     others = [machine.title for machine in answer.compared if machine.fits and not machine.is_own]
@@ -126,47 +109,47 @@ def _headline(answer: CompareAnswer) -> Sentence:
         words.append(
             f"with assumed values of other buses, shown to fit on {listed(others, 'and') if others else 'none'}"
         )
-    return sentence(
+    return blocks.sentence(
         f"{{}} at {{}}: {'; '.join(words)}.",
-        Code(answer.profile.name),
+        blocks.Code(answer.profile.name),
         period_value(answer.profile.cycle.period_us),
-        state=state_of(others or (own and own.fits)),
+        state=blocks.state_of(others or (own and own.fits)),
     )
 
 
-def _best(answer: CompareAnswer) -> Iterator[Sentence]:
+def _best(answer: CompareAnswer) -> Iterator[blocks.Sentence]:
     """Say which kind has the smallest period, and which the most axes, of those whose host's time is known."""
     ranked = [machine for machine in answer.compared if not machine.assumed_host]
     shortest = [(machine.smallest.us, machine) for machine in ranked if machine.smallest.us is not None]
     if shortest:
         us, machine = min(shortest, key=lambda pair: pair[0])
-        value = ShownValue(us, "smallest_period_us", "us", 3)
-        yield sentence(f"The smallest period is {{}} on {machine.title}.", value)
+        value = blocks.ShownValue(us, "smallest_period_us", "us", 3)
+        yield blocks.sentence(f"The smallest period is {{}} on {machine.title}.", value)
     most = [(machine.safe.axes, machine) for machine in ranked if machine.safe.axes]
     if most:
         axes, machine = max(most, key=lambda pair: pair[0])
-        yield sentence(
+        yield blocks.sentence(
             f"The most axes at {{}} are {{}} on {machine.title}.",
             period_value(answer.profile.cycle.period_us),
-            count_value(axes, SAFE_AXES.key),
+            blocks.count_value(axes, SAFE_AXES.key),
         )
     unranked = [
         f"{machine.title} ({_values(machine.assumed_host)})" for machine in answer.compared if machine.assumed_host
     ]
     if unranked:
         words = f"Not ranked, because the host's time is assumed: {listed(unranked, 'and')}."
-        yield Sentence((words,), "warns")
+        yield blocks.Sentence((words,), "warns")
 
 
 def _values(assumed: Sequence[AssumedKey]) -> str:
     return ", ".join(f"{assumption.key} = {short_text(assumption.value)}" for assumption in assumed)
 
 
-def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
+def _row(machine: MachineOnKind | NotOnKind) -> blocks.TableRow:
     """A row of the table of the kinds."""
     if isinstance(machine, NotOnKind):
-        before, after = ((ShownValue(None),) * number for number in (3, len(_COLUMNS) - 5))
-        return TableRow((machine.title, *before, Words("not compared", "warns"), *after))
+        before, after = ((blocks.ShownValue(None),) * number for number in (3, len(_COLUMNS) - 5))
+        return blocks.TableRow((machine.title, *before, blocks.Words("not compared", "warns"), *after))
     figures = machine.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
     unsafe = f", unsafe {figures.safety.setting}" if is_unsafe else ""
@@ -175,89 +158,89 @@ def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
     count = f"{defaults} {nouns(defaults, 'default')}" if defaults else ""
     best = {} if machine.best is None else machine.best.changes
     with_best = f" (smallest period: {', '.join(f'{key} = {short_text(best[key])}' for key in best)})"
-    cells: tuple[Cell, ...] = (
+    cells: tuple[blocks.Cell, ...] = (
         f"{machine.title}{', as it is' if machine.is_own else with_best if best else ''}",
-        ShownValue(machine.smallest.us, "smallest_period_us", "us", 3),
-        ShownValue(machine.safe.axes, SAFE_AXES.key),
+        blocks.ShownValue(machine.smallest.us, "smallest_period_us", "us", 3),
+        blocks.ShownValue(machine.safe.axes, SAFE_AXES.key),
         machine.safe.limited_by,
-        Words(f"{figures.verdict}{unsafe}", state_of(machine.fits)),
-        Sentence(margin_parts(figures, unit=False)),
+        blocks.Words(f"{figures.verdict}{unsafe}", blocks.state_of(machine.fits)),
+        blocks.Sentence(margin_parts(figures, unit=False)),
         figures.bus_figures.term_label(figures.binding_term),
         ", ".join(filter(None, (_values(new), count))) or "-",
     )
-    return TableRow(cells)
+    return blocks.TableRow(cells)
 
 
-def _hindrance(machine: MachineOnKind | NotOnKind) -> Sentence | None:
+def _hindrance(machine: MachineOnKind | NotOnKind) -> blocks.Sentence | None:
     """Say of a kind what stands in the way; None where nothing does."""
     if isinstance(machine, NotOnKind):
-        return Sentence((f"{machine.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
-    figures, sentences = machine.figures, list[Sentence]()
+        return blocks.Sentence((f"{machine.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
+    figures, sentences = machine.figures, list[blocks.Sentence]()
     if machine.broken_limits:
-        sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(machine.broken_limits)}.",)))
+        sentences.append(blocks.Sentence((f"At {period(figures.period_us)} {'; '.join(machine.broken_limits)}.",)))
     if not machine.safe.nodes:
         at = period(figures.period_us)
-        sentences.append(Sentence((f"No node is shown to fit {at}, limited by {machine.safe.limited_by}.",)))
+        sentences.append(blocks.Sentence((f"No node is shown to fit {at}, limited by {machine.safe.limited_by}.",)))
     if machine.smallest.us is None:
-        sentences.append(Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",)))
+        sentences.append(blocks.Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",)))
     sentences += reset_sentence(machine.after_reset)
-    return joined(Sentence((f"{machine.title}:",)), *sentences) if sentences else None
+    return blocks.joined(blocks.Sentence((f"{machine.title}:",)), *sentences) if sentences else None
 
 
-def _note(machine: MachineOnKind) -> Sentence:
+def _note(machine: MachineOnKind) -> blocks.Sentence:
     """Say of a kind what execution times mean on it, and what it is checked against."""
     sentences = []
     if machine.execution:
-        sentences.append(Sentence((machine.execution,)))
+        sentences.append(blocks.Sentence((machine.execution,)))
     if machine.best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in machine.best.changes.items())
-        sentences.append(Sentence((f"The smallest period is with {values}, which is free to change.",)))
-    sentences.append(Sentence((f"Checked against {checked_against(machine.tested)}.",)))
-    return joined(Sentence((f"{machine.title}:",)), *sentences)
+        sentences.append(blocks.Sentence((f"The smallest period is with {values}, which is free to change.",)))
+    sentences.append(blocks.Sentence((f"Checked against {checked_against(machine.tested)}.",)))
+    return blocks.joined(blocks.Sentence((f"{machine.title}:",)), *sentences)
 
 
-def _left_out(answer: CompareAnswer) -> Iterator[Sentence]:
+def _left_out(answer: CompareAnswer) -> Iterator[blocks.Sentence]:
     """Keys of the profile that are left out, once for the kinds that leave out the same."""
     titles: dict[tuple[str, ...], list[str]] = {}
     for machine in answer.compared:
         if machine.left_out:
             titles.setdefault(machine.left_out, []).append(machine.title)
     for left_out, names in titles.items():
-        keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
+        keys = blocks.joined(*(blocks.Sentence((blocks.Code(key),)) for key in left_out), by=", ")
         has_rate = any(key.startswith(("group.", "payload.")) and key.endswith(".every") for key in left_out)
         rates = " Data at a slower rate go in every cycle there." if has_rate else ""
-        yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, f".{rates}"))
+        yield blocks.Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, f".{rates}"))
 
 
-def _drawing(answer: CompareAnswer, *, title: str) -> Drawing:
+def _drawing(answer: CompareAnswer, *, title: str) -> charts.Drawing:
     """The most axes over the period: a curve for each kind of bus, and this machine as a line across and one up."""
     compared, own_us, own_axes = answer.compared, answer.profile.cycle.period_us, answer.axes
     points = [point for machine in compared for point in machine.curve]
     periods_us, top = sorted({point.period_us for point in points}), max(point.axes or 1 for point in points)
-    machine_now = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")
-    marks = letters(machine.kind.upper() for machine in compared)
-    plot = Curves(
-        logarithmic("period, logarithmic", periods_us[0], periods_us[-1], period, at=periods_us, own=own_us),
-        logarithmic("axes, logarithmic", 1, max(_LEAST_TOP, own_axes, top), lambda axes: f"{axes:.0f}"),
+    machine_now = charts.Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")
+    marks = charts.letters(machine.kind.upper() for machine in compared)
+    plot = charts.Curves(
+        charts.logarithmic("period, logarithmic", periods_us[0], periods_us[-1], period, at=periods_us, own=own_us),
+        charts.logarithmic("axes, logarithmic", 1, max(_LEAST_TOP, own_axes, top), lambda axes: f"{axes:.0f}"),
         tuple(_curve(*each) for each in zip(compared, marks, cycle(_INKS), strict=False)),
-        (Guide(machine_now, x=own_us), *([Guide(machine_now, y=own_axes)] if own_axes else [])),
+        (charts.Guide(machine_now, x=own_us), *([charts.Guide(machine_now, y=own_axes)] if own_axes else [])),
     )
-    return Drawing(title, (Panel(plot),), description=_CAPTION)
+    return charts.Drawing(title, (charts.Panel(plot),), description=_CAPTION)
 
 
-def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> Curve:
+def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> charts.Curve:
     """A point for each period that carries an axis; no axes have no place on a logarithmic scale."""
     points = [(point.period_us, point.axes) for point in machine.curve if point.axes]
     title = machine.title
     label = f"{title}{' (this profile)' if machine.is_own else ''}{'' if points else ': none'}"
-    return Curve(
-        Entry(ink, label, mark, "line"),
+    return charts.Curve(
+        charts.Entry(ink, label, mark, "line"),
         tuple(points),
         tuple(f"{title}: {plural(axes, 'axis')} at {period(us)}" for us, axes in points),
     )
 
 
-def _record(machine: MachineOnKind | NotOnKind) -> Record:
+def _record(machine: MachineOnKind | NotOnKind) -> blocks.Record:
     """A kind of bus as plain data; what a kind that cannot have the machine lacks is null."""
     tested = machine.tested
     head = {
@@ -270,13 +253,13 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
         "not_tested": list(tested.untested),
     }
     if isinstance(machine, NotOnKind):
-        empty: Record = dict.fromkeys(
+        empty: blocks.Record = dict.fromkeys(
             (
                 *(*_FIGURES, "verdict_after_reset", *_SAFE),
                 *("smallest_period_us", "smallest_period_with", "no_period"),
             )
         )
-        lists: Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
+        lists: blocks.Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
         return {**head, "why_not": list(machine.why), **empty, **lists}
     return {
         **head,
@@ -294,11 +277,11 @@ def _record(machine: MachineOnKind | NotOnKind) -> Record:
     }
 
 
-def _safe_record(safe: SafeAxes) -> Record:
+def _safe_record(safe: SafeAxes) -> blocks.Record:
     return dict(zip(_SAFE, (safe.nodes, safe.axes, safe.limited_by), strict=True))
 
 
-def _row_of_lists(record: Record) -> Record:
+def _row_of_lists(record: blocks.Record) -> blocks.Record:
     """A record without its curve, each list of records as the keys of its rows."""
     row = {name: value for name, value in record.items() if name not in ("curve", "assumed")}
     parts = {name: [part["part"] for part in record[name]] for name in ("set_by", "tested")}

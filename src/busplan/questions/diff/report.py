@@ -6,21 +6,7 @@ from operator import eq
 from typing import Final
 
 from busplan.english import listed, plural
-from busplan.forms.blocks import (
-    Block,
-    Cell,
-    Code,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    State,
-    Table,
-    TableColumn,
-    TableRow,
-    Words,
-    figure_value,
-)
+from busplan.forms import blocks
 from busplan.forms.numbers import MISSING, figure_text, sentence_text
 from busplan.profile.edit import value_text
 from busplan.profile.kinds import KeyValue
@@ -29,20 +15,20 @@ from busplan.questions.diff import ComparedFigure, DiffAnswer, DiffSide, Judgeme
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 
 _KEYS: Final = (
-    TableColumn("key", kind="words", wraps=True),
-    *(TableColumn(heading, kind="words", wraps=True) for heading in ("A", "B")),
+    blocks.TableColumn("key", kind="words", wraps=True),
+    *(blocks.TableColumn(heading, kind="words", wraps=True) for heading in ("A", "B")),
 )
 _FIGURES: Final = (
-    TableColumn("figure", kind="words"),
-    TableColumn("of", kind="words"),
-    TableColumn("unit", kind="words"),
-    TableColumn("A"),
-    TableColumn("B"),
-    TableColumn("B - A"),
-    TableColumn("relative", "%", rank=1),
-    TableColumn("B is", kind="words"),
+    blocks.TableColumn("figure", kind="words"),
+    blocks.TableColumn("of", kind="words"),
+    blocks.TableColumn("unit", kind="words"),
+    blocks.TableColumn("A"),
+    blocks.TableColumn("B"),
+    blocks.TableColumn("B - A"),
+    blocks.TableColumn("relative", "%", rank=1),
+    blocks.TableColumn("B is", kind="words"),
 )
-_STATES: Final[dict[Judgement, State]] = {
+_STATES: Final[dict[Judgement, blocks.State]] = {
     "worse": "fails",
     "better": "passes",
     "same": "neutral",
@@ -61,7 +47,7 @@ _CONTEXT: Final = 8
 """Characters shown before the first one that differs."""
 
 
-def diff_report(answer: DiffAnswer) -> Report:
+def diff_report(answer: DiffAnswer) -> blocks.Report:
     """Report of `diff`."""
     summary = _sentence(answer)
     records = [
@@ -83,8 +69,8 @@ def diff_report(answer: DiffAnswer) -> Report:
         }
         for change in answer.keys
     ]
-    return Report(
-        Sentence(("Changes from ", Code(answer.a.argument), " to ", Code(answer.b.argument))),
+    return blocks.Report(
+        blocks.Sentence(("Changes from ", blocks.Code(answer.a.argument), " to ", blocks.Code(answer.b.argument))),
         tuple(_blocks(answer, summary)),
         document(
             "diff",
@@ -106,17 +92,19 @@ def regression_words(answer: DiffAnswer, *, tolerance_percent: float) -> str:
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}" if names else ""
 
 
-def _sentence(answer: DiffAnswer) -> Sentence:
+def _sentence(answer: DiffAnswer) -> blocks.Sentence:
     """Sentence with the verdicts of both, and with the figures in which B is worse and better."""
     sides = ((" (A) ", answer.a), (" (B) ", answer.b))
-    parts = [part for label, side in sides for part in (Code(side.argument), f"{label}{_verdict(side)}", ", ")][:-1]
+    parts = [part for label, side in sides for part in (blocks.Code(side.argument), f"{label}{_verdict(side)}", ", ")][
+        :-1
+    ]
     judged = [words for judgement in ("worse", "better") if (words := _judged(answer, judgement))]
     if answer.same:
         rest = "every key has the same value"
     else:
         rest = f"B is {', and '.join(judged)}" if judged else "no figure is better or worse"
-    state: State = "fails" if answer.judged("worse") else "passes" if judged else "neutral"
-    return Sentence((*parts, f"; {rest}."), state)
+    state: blocks.State = "fails" if answer.judged("worse") else "passes" if judged else "neutral"
+    return blocks.Sentence((*parts, f"; {rest}."), state)
 
 
 def _verdict(side: DiffSide) -> str:
@@ -145,17 +133,17 @@ def _names(figures: Sequence[ComparedFigure]) -> list[str]:
     return [f"{label} ({of[0]})" if len(of) == 1 and of not in of_all else label for label, of in parts.items()]
 
 
-def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
+def _blocks(answer: DiffAnswer, summary: blocks.Sentence) -> Iterator[blocks.Block]:
     yield summary
     if answer.keys:
         rows = (
-            TableRow(
-                (Code(key.key), _cell(key.key, key.a, key.b), _cell(key.key, key.b, key.a)),
+            blocks.TableRow(
+                (blocks.Code(key.key), _cell(key.key, key.a, key.b), _cell(key.key, key.b, key.a)),
                 is_detail=number >= _MOST_KEYS or {key.a and key.a.source, key.b and key.b.source} == {None, "default"},
             )
             for number, key in enumerate(answer.keys)
         )
-        yield Table(_KEYS, tuple(rows))
+        yield blocks.Table(_KEYS, tuple(rows))
     # Figures that only one of two kinds of bus has are no difference.
     differ = [
         figure
@@ -167,24 +155,24 @@ def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
         deciding = {"plan", *(side.deciding.timing_model for side in (answer.a, answer.b))}
         first = [figure for figure in differ if figure.judgement != "neutral" and figure.part in deciding] or differ
         rows = (_row(figure)._replace(is_detail=figure not in first) for figure in differ)
-        yield Table(_FIGURES, tuple(rows), heads=3)
+        yield blocks.Table(_FIGURES, tuple(rows), heads=3)
 
 
-def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> Cell:
+def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> blocks.Cell:
     """One side of a difference. The other side decides which part or how many digits of a long value are shown."""
     if value is None:
         return MISSING
     here, there = value.value, None if opposite is None else opposite.value
-    shown: ShownValue | Code | str
+    shown: blocks.ShownValue | blocks.Code | str
     if here is None:
         shown = "none"
     elif isinstance(here, int | float) and not isinstance(here, bool):
-        shown = ShownValue(here, key)
+        shown = blocks.ShownValue(here, key)
         if here != there and figure_text(shown) == figure_text(shown._replace(value=there)):
             shown = shown._replace(digits=_ALL_DIGITS)
     else:
-        shown = Code(excerpt(value_text(here), "" if there is None else value_text(there)))
-    return shown if value.source == "file" else Sentence((shown, " (default)"))
+        shown = blocks.Code(excerpt(value_text(here), "" if there is None else value_text(there)))
+    return shown if value.source == "file" else blocks.Sentence((shown, " (default)"))
 
 
 def excerpt(text: str, opposite: str = "") -> str:
@@ -202,15 +190,17 @@ def excerpt(text: str, opposite: str = "") -> str:
     return f"{'..' if start else ''}{text[start:end]}{'..' if end < len(text) else ''}"
 
 
-def _row(compared: ComparedFigure) -> TableRow:
+def _row(compared: ComparedFigure) -> blocks.TableRow:
     figure = compared.figure
-    a, b, difference = (figure_value(figure, getattr(compared, key)) for key in ("a", "b", "difference"))
-    relative = ShownValue(compared.relative_difference, "relative_difference", "%", 1, signed=True)
-    judged = Words(compared.judgement, _STATES[compared.judgement])
-    return TableRow((figure.label, compared.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
+    a, b, difference = (blocks.figure_value(figure, getattr(compared, key)) for key in ("a", "b", "difference"))
+    relative = blocks.ShownValue(compared.relative_difference, "relative_difference", "%", 1, signed=True)
+    judged = blocks.Words(compared.judgement, _STATES[compared.judgement])
+    return blocks.TableRow(
+        (figure.label, compared.part, b.unit, a, b, difference._replace(signed=True), relative, judged)
+    )
 
 
-def _side_record(side: DiffSide) -> Record:
+def _side_record(side: DiffSide) -> blocks.Record:
     return {
         "argument": side.argument,
         "profile": side.profile.name,

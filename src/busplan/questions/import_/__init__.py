@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Code, Report, Sentence, ShownValue, Table, TableColumn, TableRow, sentence
+from busplan.forms import blocks
 from busplan.profile.document import decode, validate
 from busplan.profile.edit import short_text
 from busplan.progress import Progress
@@ -29,8 +29,8 @@ _ROUNDING_US: Final = 1e-6
 _ROWS: Final = {"ethercat": ethercat.rows, "can": can.rows}
 """Lines of the profile by kind of bus."""
 _COLUMNS: Final = (
-    *(TableColumn(heading, kind="words") for heading in ("key", "value", "grade", "file and line")),
-    TableColumn("note", kind="words", rank=1, wraps=True),
+    *(blocks.TableColumn(heading, kind="words") for heading in ("key", "value", "grade", "file and line")),
+    blocks.TableColumn("note", kind="words", rank=1, wraps=True),
 )
 
 
@@ -52,7 +52,7 @@ class ImportAnswer(Answer):
         """Contradictions and gaps of the files, the card of `capacity`, and values that stay unknown."""
         return (*self.remarks, *self.card, *self._unknown())
 
-    def report(self) -> Report:
+    def report(self) -> blocks.Report:
         """The answer in blocks: the verdict, what stays unknown, and every value with its place."""
         facts = ((row, row.fact) for row in self.rows)
         records = [
@@ -60,14 +60,14 @@ class ImportAnswer(Answer):
             for row, fact in facts
         ]
         rows = (
-            TableRow((Code(row.dotted), _shown(row.plain), row.fact.grade, row.fact.place, row.fact.note))
+            blocks.TableRow((blocks.Code(row.dotted), _shown(row.plain), row.fact.grade, row.fact.place, row.fact.note))
             for row in self.rows
         )
         verdict = " ".join(self.card[0].split())
-        words = (Sentence((text,)) for text in (verdict, *self.remarks, *self._unknown()))
-        return Report(
-            sentence("{}, from files of the machine", Code(self.profile.name)),
-            (*words, Table(_COLUMNS, tuple(rows))),
+        words = (blocks.Sentence((text,)) for text in (verdict, *self.remarks, *self._unknown()))
+        return blocks.Report(
+            blocks.sentence("{}, from files of the machine", blocks.Code(self.profile.name)),
+            (*words, blocks.Table(_COLUMNS, tuple(rows))),
             document("import", name=self.profile.name, values=records, remarks=list(self.remarks)),
             records,
         )
@@ -84,8 +84,8 @@ class ImportAnswer(Answer):
         return (f"Not known, so assumed: {listed}.",) if listed else ()
 
 
-def _shown(value: object) -> ShownValue | str:
-    return ShownValue(value) if isinstance(value, int | float) else short_text(value)
+def _shown(value: object) -> blocks.ShownValue | str:
+    return blocks.ShownValue(value) if isinstance(value, int | float) else short_text(value)
 
 
 def import_profile(

@@ -26,23 +26,8 @@ from busplan.questions.import_.can import (
 )
 from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.reading import Fact, Reading, assumed
+from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_timing import (
-    LISTED,
-    WINDOW_US,
-    ClockStretch,
-    EventModel,
-    LeastBitRate,
-    SentFrames,
-    event_model,
-    faults,
-    frames_by_identifier,
-    fullest_load,
-    least_bit_rate,
-    longest_stretch,
-    stamps_of_no_bus,
-    step_us,
-)
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, steady_rate
 
 _BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
@@ -70,9 +55,9 @@ _MORE_JITTER: Final = 0.05
 class _Timing(NamedTuple):
     """Timing of an identifier."""
 
-    sent: SentFrames
+    sent: can_timing.SentFrames
     period_us: float
-    model: EventModel
+    model: can_timing.EventModel
     uncertainty_us: float | None
     """Expanded uncertainty of the period [us]; None for a message that is not periodic."""
 
@@ -92,11 +77,11 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
     if frames.synthetic:
         raise BusplanError(f"{name}: is {frames.synthetic}: it measures no machine, and its profile is there already")
     try:
-        stretch = longest_stretch(frames)
+        stretch = can_timing.longest_stretch(frames)
     except BusplanError as error:
         raise BusplanError(f"{name}: {error}") from None
-    messages = list(frames_by_identifier(frames, stretch).values())
-    least = least_bit_rate(frames, stretch)
+    messages = list(can_timing.frames_by_identifier(frames, stretch).values())
+    least = can_timing.least_bit_rate(frames, stretch)
     _require_times(stretch, messages, least.likely, name)
     machine = Reading("can", "CAN log", name, rank=2, lists_all=False, is_log=True)
     timings = _timings(messages, stretch)
@@ -110,7 +95,9 @@ def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> R
     return machine
 
 
-def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_kbit_s: float, name: str) -> None:
+def _require_times(
+    stretch: can_timing.ClockStretch, messages: Iterable[can_timing.SentFrames], least_kbit_s: float, name: str
+) -> None:
     """Raise BusplanError for a log that does not show when frames come."""
     often = [sent for sent in messages if len(sent.times_us) >= LEAST_EVENTS]
     if not often:
@@ -119,19 +106,19 @@ def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_
             "too few for a plan; record for longer"
         )
     fastest = max(often, key=lambda sent: len(sent.times_us))
-    mean_us, error_us = stretch.length_us / len(fastest.times_us), step_us(stretch)
+    mean_us, error_us = stretch.length_us / len(fastest.times_us), can_timing.step_us(stretch)
     if not error_us or 2 * error_us > mean_us:
         steps = f"steps of {error_us:,.0f} us" if error_us else "one time for all frames"
         raise BusplanError(
             f"{name}: its stamps have {steps}, too coarse for {fastest.identifier:#x}, which comes every "
             f"{mean_us:,.0f} us; record with finer stamps, as `candump -l` has them"
         )
-    reason = stamps_of_no_bus(least_kbit_s)
+    reason = can_timing.stamps_of_no_bus(least_kbit_s)
     if reason:
         raise BusplanError(f"{name}: {reason}; record the bus itself, as with `candump -l`")
 
 
-def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Timing]:
+def _timings(messages: Sequence[can_timing.SentFrames], stretch: can_timing.ClockStretch) -> list[_Timing]:
     """Event models of the identifiers that allow all frames, with little more load than the fullest second.
 
     A periodic message has its period. Any other one has the rate and the burst of its arrival curve at a window of a
@@ -140,8 +127,8 @@ def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Tim
     have grown by more frames than that has.
     """
     longest_us = [_longest_us(sent) for sent in messages]
-    most = MOST_OF_FULLEST * fullest_load(*_wire_us(messages, longest_us))
-    window_us, share = WINDOW_US, 1.0
+    most = MOST_OF_FULLEST * can_timing.fullest_load(*_wire_us(messages, longest_us))
+    window_us, share = can_timing.WINDOW_US, 1.0
     rows = [sent.periods is not None for sent in messages]
     before: list[_Timing] = []
     most_at_once_us = 0.0
@@ -152,13 +139,13 @@ def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Tim
         ]
         loads = [us / timing.period_us for us, timing in zip(longest_us, timings, strict=True)]
         at_once_us = sum(us * timing.model.burst for us, timing in zip(longest_us, timings, strict=True))
-        most_at_once_us = most_at_once_us or at_once_us + most / MOST_OF_FULLEST * WINDOW_US
+        most_at_once_us = most_at_once_us or at_once_us + most / MOST_OF_FULLEST * can_timing.WINDOW_US
         if at_once_us > most_at_once_us:
             return before
         if sum(loads) <= most or share < 1:
             return timings
         before = timings
-        if window_us == WINDOW_US:
+        if window_us == can_timing.WINDOW_US:
             rows = [is_row and _is_always(sent, stretch) for sent, is_row in zip(messages, rows, strict=True)]
         if window_us > stretch.length_us:
             periodic = sum(load for load, is_row in zip(loads, rows, strict=True) if is_row)
@@ -167,12 +154,14 @@ def _timings(messages: Sequence[SentFrames], stretch: ClockStretch) -> list[_Tim
         window_us *= _LONGER
 
 
-def _is_always(sent: SentFrames, stretch: ClockStretch) -> bool:
+def _is_always(sent: can_timing.SentFrames, stretch: can_timing.ClockStretch) -> bool:
     """Whether a periodic message comes during nearly all of the log."""
     return float(sent.times_us[-1] - sent.times_us[0]) + sent.mean.value >= _ALWAYS * stretch.length_us
 
 
-def _longest_us(sent: SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
+def _longest_us(
+    sent: can_timing.SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_kbit_s: float = DATA_BIT_RATE
+) -> float:
     """Time on the wire of an identifier's longest frame, with the most stuff bits [us]."""
     switched = max(data_bit_rate_kbit_s, bit_rate_kbit_s) if sent.switches else bit_rate_kbit_s
     us = frame_us(
@@ -185,7 +174,7 @@ def _longest_us(sent: SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_
     return float(us)
 
 
-def _wire_us(messages: Sequence[SentFrames], longest_us: Sequence[float]) -> tuple[Floats, Floats]:
+def _wire_us(messages: Sequence[can_timing.SentFrames], longest_us: Sequence[float]) -> tuple[Floats, Floats]:
     """Stamps of all frames, ascending, and times on the wire, each as of the longest frame of its identifier [us]."""
     times_us = np.concatenate([sent.times_us for sent in messages])
     wire_us = np.repeat(longest_us, [len(sent.times_us) for sent in messages])
@@ -193,41 +182,45 @@ def _wire_us(messages: Sequence[SentFrames], longest_us: Sequence[float]) -> tup
     return times_us[order], wire_us[order]
 
 
-def _fullest(messages: Sequence[SentFrames], stretch: ClockStretch) -> MostLoad:
+def _fullest(messages: Sequence[can_timing.SentFrames], stretch: can_timing.ClockStretch) -> MostLoad:
     """Load of the log's fullest second by bit rates, and number of its seconds with frames."""
 
     def load(bit_rate_kbit_s: float, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
         us = [_longest_us(sent, bit_rate_kbit_s, data_bit_rate_kbit_s) for sent in messages]
-        return fullest_load(*_wire_us(messages, us))
+        return can_timing.fullest_load(*_wire_us(messages, us))
 
-    seconds = np.unique((stretch.times_us - stretch.times_us[0]) // WINDOW_US)
+    seconds = np.unique((stretch.times_us - stretch.times_us[0]) // can_timing.WINDOW_US)
     return MostLoad(load, len(seconds), int(seconds[-1]) + 1)
 
 
-def _periodic(sent: SentFrames, stretch: ClockStretch) -> _Timing:
+def _periodic(sent: can_timing.SentFrames, stretch: can_timing.ClockStretch) -> _Timing:
     """Period and jitter of a message that comes once a period."""
     period_us, error_us = sent.mean
     doubt_us = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
     return _covering(sent, period_us, doubt_us / 2, stretch)._replace(uncertainty_us=doubt_us)
 
 
-def _steady(sent: SentFrames, stretch: ClockStretch, window_us: float, share: float) -> _Timing:
+def _steady(sent: can_timing.SentFrames, stretch: can_timing.ClockStretch, window_us: float, share: float) -> _Timing:
     """Rate and burst of a message that is not periodic; the rate is at least a share of the log's mean rate."""
     rate = max(steady_rate(sent.times_us, window_us), share * len(sent.times_us) / stretch.length_us)
     period_us = min(max(1 / rate, _LEAST_US), _MOST_US)
     return _covering(sent, period_us, _ROUNDED * period_us, stretch)
 
 
-def _covering(sent: SentFrames, period_us: float, doubt_us: float, stretch: ClockStretch) -> _Timing:
+def _covering(
+    sent: can_timing.SentFrames, period_us: float, doubt_us: float, stretch: can_timing.ClockStretch
+) -> _Timing:
     """A period rounded within a doubt [us], with the jitter or burst that allows all frames."""
-    times_us, error_us = sent.times_us, step_us(stretch) if len(sent.times_us) > 1 else 0.0
+    times_us, error_us = sent.times_us, can_timing.step_us(stretch) if len(sent.times_us) > 1 else 0.0
     least_us = float(ahead(times_us, period_us).max()) + _MORE_JITTER * period_us
 
     def allows(rounded_us: float) -> bool:
         return rounded_us <= period_us or float(ahead(times_us, rounded_us).max()) <= least_us
 
     period_us = next(filter(allows, _roundings(period_us, doubt_us)), period_us)
-    return _Timing(sent, period_us, event_model(times_us, period_us, stamp_error_us=error_us, tolerance=0.0), None)
+    return _Timing(
+        sent, period_us, can_timing.event_model(times_us, period_us, stamp_error_us=error_us, tolerance=0.0), None
+    )
 
 
 def _roundings(value: float, doubt: float) -> Iterator[float]:
@@ -245,7 +238,7 @@ def _roundings(value: float, doubt: float) -> Iterator[float]:
                 yield rounded
 
 
-def _facts(timing: _Timing, stretch: ClockStretch, place: str) -> Iterator[tuple[str, Fact]]:
+def _facts(timing: _Timing, stretch: can_timing.ClockStretch, place: str) -> Iterator[tuple[str, Fact]]:
     sent, model = timing.sent, timing.model
     frames = plural(len(sent.times_us), "frame")
     yield "name", Fact(f"id-{sent.identifier:#x}", place)
@@ -259,11 +252,11 @@ def _facts(timing: _Timing, stretch: ClockStretch, place: str) -> Iterator[tuple
     )
     yield "period_us", Fact(timing.period_us, place, "measured", f"{frames}, {kind}")
     yield from timing_facts(model, timing.period_us, place, is_periodic=timing.is_periodic)
-    yield SENT, Fact((sent.times_us, step_us(stretch)))
+    yield SENT, Fact((sent.times_us, can_timing.step_us(stretch)))
 
 
-def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing]) -> Iterator[str]:
-    yield from faults(frames, stretch)
+def _remarks(frames: CanFrames, stretch: can_timing.ClockStretch, timings: list[_Timing]) -> Iterator[str]:
+    yield from can_timing.faults(frames, stretch)
     number = plural(len(stretch.taken), "frame")
     yield f"The log has {number} of {plural(len(timings), 'identifier')} in {stretch.length_us / 1e6:.3g} s"
     if frames.errors:
@@ -279,11 +272,15 @@ def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing]) -
 
 
 def _names(timings: Iterable[_Timing]) -> str:
-    return first_of([f"{timing.sent.identifier:#x}" for timing in timings], LISTED)
+    return first_of([f"{timing.sent.identifier:#x}" for timing in timings], can_timing.LISTED)
 
 
 def _bit_rate(
-    machine: Reading, frames: CanFrames, stretch: ClockStretch, least: LeastBitRate, fullest: MostLoad
+    machine: Reading,
+    frames: CanFrames,
+    stretch: can_timing.ClockStretch,
+    least: can_timing.LeastBitRate,
+    fullest: MostLoad,
 ) -> None:
     """Bit rate that frames in direct succession show; else the question for it."""
     machine.bus[LEAST] = Fact(least)

@@ -9,40 +9,8 @@ from typing import Final, NamedTuple
 from busplan.buses.figure import MARGIN_CORRECTED, UNCERTAINTY, Ink, unit_of
 from busplan.buses.limits import Value
 from busplan.english import nouns
-from busplan.forms.blocks import (
-    Block,
-    Chart,
-    Code,
-    JsonDocument,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    Swatch,
-    Table,
-    TableColumn,
-    TableRow,
-    Words,
-    attribute_value,
-    count_value,
-    joined,
-    sentence,
-)
+from busplan.forms import blocks, charts
 from busplan.forms.blocks import State as Tone
-from busplan.forms.charts import (
-    ChartCell,
-    ChartGrid,
-    Curve,
-    Curves,
-    Drawing,
-    Entry,
-    Guide,
-    Panel,
-    Shade,
-    choices,
-    letters,
-    numbers,
-)
 from busplan.forms.numbers import period_value, sentence_text, with_unit
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY
@@ -81,60 +49,62 @@ _BARRED: Final = Look("x", "barred", "neutral")
 """Cells where no period helps; the letter names the limit."""
 
 
-def map_report(answer: MapAnswer) -> Report:
+def map_report(answer: MapAnswer) -> blocks.Report:
     """Report of `map`."""
     whole = map_document(answer)
-    return Report(
-        Sentence(("Map of ", Code(answer.profile.name))),
+    return blocks.Report(
+        blocks.Sentence(("Map of ", blocks.Code(answer.profile.name))),
         tuple(_blocks(answer)),
         whole,
         with_profile(answer.profile.name, whole["cells"]),
     )
 
 
-def _blocks(answer: MapAnswer) -> Iterator[Block]:
+def _blocks(answer: MapAnswer) -> Iterator[blocks.Block]:
     """How much fits and whether this design does, the picture, and what limits each region."""
     headline, looks = _headline(answer), _looks(answer)
     yield headline
     yield from _remarks(answer)
     if answer.y is None:
         if answer.profile.has_cycle:
-            yield Chart(_curve(answer), Sentence((_CURVE.format(key=title_of(answer.x, answer.profile)),)))
+            yield blocks.Chart(
+                _curve(answer), blocks.Sentence((_CURVE.format(key=title_of(answer.x, answer.profile)),))
+            )
         yield _values_table(answer)
         return
     title = " against ".join(title_of(direction, answer.profile) for direction in answer.directions)
     steps = "" if all(map(_is_even, answer.directions)) else "; steps are unequal"
-    yield Chart(map_drawing(answer), Sentence((f"{title[:1].upper()}{title[1:]}{steps}",)))
+    yield blocks.Chart(map_drawing(answer), blocks.Sentence((f"{title[:1].upper()}{title[1:]}{steps}",)))
     yield _regions_table(answer, looks)
 
 
-def _headline(answer: MapAnswer) -> Sentence:
+def _headline(answer: MapAnswer) -> blocks.Sentence:
     """How many settings fit, and whether this design does."""
     fitting, drawn = _counts(answer)
     circle = " with a circle that passes" if answer.with_circle else ""
     words = f"{{}}: {{}} of {{}} {nouns(len(answer.cells), 'setting')} are shown to fit{circle}."
-    counts = sentence(words, Code(answer.profile.name), fitting, drawn)
+    counts = blocks.sentence(words, blocks.Code(answer.profile.name), fitting, drawn)
     design = answer.design
     if design is None:
-        return joined(counts, Sentence(("This design is not on the map: it has other values.",)))
+        return blocks.joined(counts, blocks.Sentence(("This design is not on the map: it has other values.",)))
     tone = LOOKS[design.state].tone
-    verdict = Sentence((f"This design ({_setting_words(answer, design)}): {_verdict_words(answer, design)}.",))
-    return joined(Sentence(counts.parts, "fails" if tone == "neutral" else tone), verdict)
+    verdict = blocks.Sentence((f"This design ({_setting_words(answer, design)}): {_verdict_words(answer, design)}.",))
+    return blocks.joined(blocks.Sentence(counts.parts, "fails" if tone == "neutral" else tone), verdict)
 
 
-def _counts(answer: MapAnswer) -> tuple[ShownValue, ShownValue]:
+def _counts(answer: MapAnswer) -> tuple[blocks.ShownValue, blocks.ShownValue]:
     """Settings that fit, and all."""
-    return count_value(sum(cell.state == FITS for cell in answer.cells)), count_value(len(answer.cells))
+    return blocks.count_value(sum(cell.state == FITS for cell in answer.cells)), blocks.count_value(len(answer.cells))
 
 
-def _remarks(answer: MapAnswer) -> Iterator[Sentence]:
+def _remarks(answer: MapAnswer) -> Iterator[blocks.Sentence]:
     """What is not drawn or not judged, and why."""
     missing = answer.not_drawn
     if missing:
-        number = count_value(len(missing))
-        yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
+        number = blocks.count_value(len(missing))
+        yield blocks.sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
     if any(cell.state == "circle not judged" for cell in answer.cells):
-        yield Sentence(
+        yield blocks.Sentence(
             ("Not every circle is judged: no contour tolerance is asked for, or no error source matters.",), "warns"
         )
     yield from payload_sentences(answer.profile, [direction.key for direction in answer.directions])
@@ -151,11 +121,11 @@ def _looks(answer: MapAnswer) -> _Looks:
     # A limit alone has its own letter first; several together have b for both.
     barred.sort(key=len)
     names = (limits[0] if len(limits) == 1 else f"both{''.join(limits)}" for limits in barred)
-    marks = zip(barred, letters(names), strict=True)
+    marks = zip(barred, charts.letters(names), strict=True)
     return looks | {("does not fit", limits): _BARRED._replace(mark=mark) for limits, mark in marks}
 
 
-def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> Drawing:
+def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> charts.Drawing:
     """Draw the verdict and its limit at each setting.
 
     Parameters
@@ -168,16 +138,16 @@ def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> D
     looks, legend = _looks(answer), []
     for (state, limits), look in looks.items():
         limit = f": {' and '.join(limits)}" if look.ink == _BARRED.ink else ""
-        legend.append(Entry(look.ink, f"{_state_words(answer, state)}{limit}", look.mark))
+        legend.append(charts.Entry(look.ink, f"{_state_words(answer, state)}{limit}", look.mark))
     design = None
     if frame is not None or answer.design_place is not None:
         row, column = frame or answer.design_place or (0, 0)
         design = (column, row)
-        legend.append(Entry("frame", "this design" if frame is None else "this setting"))
+        legend.append(charts.Entry("frame", "this design" if frame is None else "this setting"))
     if answer.not_drawn:
-        legend.append(Entry("blank", "blank: cannot exist"))
+        legend.append(charts.Entry("blank", "blank: cannot exist"))
     up, across = (
-        choices(
+        charts.choices(
             f"{title_of(direction, answer.profile)}{'' if _is_even(direction) else ' in unequal steps'}",
             (value_text(direction, value) for value in direction.values),
             own=place,
@@ -186,7 +156,9 @@ def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> D
     )
     rows = tuple(tuple(_cell(answer, cell, looks) for cell in row) for row in answer.rows)
     title = sentence_text(_headline(answer))
-    return Drawing(title, (Panel(ChartGrid(across, up, rows, tuple(legend), design)),), has_characters=True)
+    return charts.Drawing(
+        title, (charts.Panel(charts.ChartGrid(across, up, rows, tuple(legend), design)),), has_characters=True
+    )
 
 
 _CURVE: Final = "Free time with its uncertainty, over {key}"
@@ -194,7 +166,7 @@ _MOST_DOTS: Final = 24
 """Most points of a curve that have a mark each."""
 
 
-def _curve(answer: MapAnswer) -> Drawing:
+def _curve(answer: MapAnswer) -> charts.Drawing:
     """Draw the free time of one varied key, its uncertainty, and where it is not shown to fit."""
     names = [value_text(answer.x, value) for value in answer.x.values]
     values = [value for value in answer.x.values if isinstance(value, int | float) and not isinstance(value, bool)]
@@ -206,18 +178,18 @@ def _curve(answer: MapAnswer) -> Drawing:
     title = title_of(answer.x, answer.profile)
     unit = unit_of(answer.x.key)
     label = f"{title}, {unit}" if unit and is_line else title
-    across = numbers(label, places[0], places[-1]) if is_line else choices(label, names, own=own)
+    across = charts.numbers(label, places[0], places[-1]) if is_line else charts.choices(label, names, own=own)
     shown_us = [us for us in (0.0, *free_us, *chain(*filter(None, ends_us))) if us is not None]
     middles = [(left + right) / 2 for left, right in pairwise(places)]
     edges = [across.low, *middles, across.high]
     shades = (
-        Shade(Entry(LOOKS[cell.state].ink, _state_words(answer, cell.state)), *ends)
+        charts.Shade(charts.Entry(LOOKS[cell.state].ink, _state_words(answer, cell.state)), *ends)
         for cell, *ends in zip(row, edges, edges[1:], strict=False)
         if cell is not None and cell.state != FITS
     )
     curves = [
-        Curve(
-            Entry("first", "free time", "o", "line"),
+        charts.Curve(
+            charts.Entry("first", "free time", "o", "line"),
             tuple(zip(places, free_us, strict=True)),
             words=tuple("" if cell is None else _cell_words(answer, cell) for cell in row),
             has_dots=len(places) <= _MOST_DOTS,
@@ -226,19 +198,20 @@ def _curve(answer: MapAnswer) -> Drawing:
     ]
     if any(ends_us):
         curves += [
-            Curve(
-                Entry("gap", "with its uncertainty" if end else "", shape="line"),
+            charts.Curve(
+                charts.Entry("gap", "with its uncertainty" if end else "", shape="line"),
                 tuple((place, ends and ends[end]) for place, ends in zip(places, ends_us, strict=True)),
                 has_dots=not is_line,
                 has_line=is_line,
             )
             for end in (0, 1)
         ]
-    guides = [Guide(Entry("limit", "no free time", shape="line"), y=0.0)]
-    guides += [] if own is None else [Guide(Entry("own", "this design", shape="line"), x=own)]
-    up = numbers("free time, us", min(shown_us), max(shown_us), room=0.06)
-    return Drawing(
-        sentence_text(_headline(answer)), (Panel(Curves(across, up, tuple(curves), tuple(guides), tuple(shades))),)
+    guides = [charts.Guide(charts.Entry("limit", "no free time", shape="line"), y=0.0)]
+    guides += [] if own is None else [charts.Guide(charts.Entry("own", "this design", shape="line"), x=own)]
+    up = charts.numbers("free time, us", min(shown_us), max(shown_us), room=0.06)
+    return charts.Drawing(
+        sentence_text(_headline(answer)),
+        (charts.Panel(charts.Curves(across, up, tuple(curves), tuple(guides), tuple(shades))),),
     )
 
 
@@ -249,58 +222,60 @@ def _ends_us(cell: Cell) -> tuple[float, float] | None:
     return cell.margin_corrected_us - cell.uncertainty_us, cell.margin_corrected_us + cell.uncertainty_us
 
 
-def _values_table(answer: MapAnswer) -> Table:
+def _values_table(answer: MapAnswer) -> blocks.Table:
     """Verdict, limit and free time at each value of one key."""
     columns = (
-        TableColumn(title_of(answer.x, answer.profile), kind="words"),
-        TableColumn("verdict", kind="words"),
-        TableColumn("limited by", kind="words", wraps=True),
-        *((TableColumn("free", "us"), TableColumn("+/-", "us")) if answer.profile.has_cycle else ()),
+        blocks.TableColumn(title_of(answer.x, answer.profile), kind="words"),
+        blocks.TableColumn("verdict", kind="words"),
+        blocks.TableColumn("limited by", kind="words", wraps=True),
+        *((blocks.TableColumn("free", "us"), blocks.TableColumn("+/-", "us")) if answer.profile.has_cycle else ()),
     )
     rows = []
     for cell in answer.cells:
-        state = Words(_state_words(answer, cell.state), LOOKS[cell.state].tone)
-        times = [attribute_value(figure, cell) for figure in (MARGIN_CORRECTED, UNCERTAINTY)]
+        state = blocks.Words(_state_words(answer, cell.state), LOOKS[cell.state].tone)
+        times = [blocks.attribute_value(figure, cell) for figure in (MARGIN_CORRECTED, UNCERTAINTY)]
         words = (value_text(answer.x, cell.x), state, _limit_words(answer, cell))
-        rows.append(TableRow((*words, *(times if answer.profile.has_cycle else ())), highlighted=cell is answer.design))
-    return Table(columns, tuple(rows), heads=1)
+        rows.append(
+            blocks.TableRow((*words, *(times if answer.profile.has_cycle else ())), highlighted=cell is answer.design)
+        )
+    return blocks.Table(columns, tuple(rows), heads=1)
 
 
 def _cell_words(answer: MapAnswer, cell: Cell) -> str:
     return f"{_setting_words(answer, cell)}: {_verdict_words(answer, cell)}"
 
 
-def _cell(answer: MapAnswer, cell: Cell | NotDrawn, looks: _Looks) -> ChartCell | None:
+def _cell(answer: MapAnswer, cell: Cell | NotDrawn, looks: _Looks) -> charts.ChartCell | None:
     if isinstance(cell, NotDrawn):
         return None
     look = looks[cell.state, cell.reasons]
-    return ChartCell(look.ink, look.mark, _cell_words(answer, cell), look.tone)
+    return charts.ChartCell(look.ink, look.mark, _cell_words(answer, cell), look.tone)
 
 
-def _regions_table(answer: MapAnswer, looks: _Looks) -> Table:
+def _regions_table(answer: MapAnswer, looks: _Looks) -> blocks.Table:
     """State, limit and number of settings of each region."""
     columns = (
-        TableColumn("state", kind="words"),
-        TableColumn("limited by", kind="words", wraps=True),
-        TableColumn("settings"),
+        blocks.TableColumn("state", kind="words"),
+        blocks.TableColumn("limited by", kind="words", wraps=True),
+        blocks.TableColumn("settings"),
     )
     rows = []
     for region in answer.regions:
         look = looks[region.state, region.reasons]
-        state = Swatch(look.ink, look.mark, _state_words(answer, region.state))
-        rows.append(TableRow((state, _limit_words(answer, region), count_value(region.cells, "cells"))))
-    return Table(columns, tuple(rows), Sentence(("What limits each region",)))
+        state = blocks.Swatch(look.ink, look.mark, _state_words(answer, region.state))
+        rows.append(blocks.TableRow((state, _limit_words(answer, region), blocks.count_value(region.cells, "cells"))))
+    return blocks.Table(columns, tuple(rows), blocks.Sentence(("What limits each region",)))
 
 
-def circle_words(answer: MapAnswer, cell: Cell) -> Sentence | None:
+def circle_words(answer: MapAnswer, cell: Cell) -> blocks.Sentence | None:
     """Result of the circle test of a cell; None if none was asked for, or the cell does not fit."""
     if not answer.with_circle or cell.verdict != FITS or cell.state == "unsafe":
         return None
     words = ", ".join(("passes" if cell.state == FITS else cell.state.removeprefix("circle "), *cell.reasons))
     if cell.max_contour_error_mm is None:
-        return Sentence((words,), LOOKS[cell.state].tone)
-    error = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], cell)
-    return sentence(f"{words}; largest error {{}}", error, state=LOOKS[cell.state].tone)
+        return blocks.Sentence((words,), LOOKS[cell.state].tone)
+    error = blocks.attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], cell)
+    return blocks.sentence(f"{words}; largest error {{}}", error, state=LOOKS[cell.state].tone)
 
 
 def _setting_words(answer: MapAnswer, cell: Cell) -> str:
@@ -344,7 +319,7 @@ def value_text(direction: Direction, value: Value) -> str:
     """Write a value of a direction in few characters: only a period has its unit, any other is in that of its key."""
     if isinstance(value, str | bool):
         return str(value).lower() if isinstance(value, bool) else value
-    shown = period_value(value) if direction.key == PERIOD else ShownValue(value)
+    shown = period_value(value) if direction.key == PERIOD else blocks.ShownValue(value)
     return with_unit(shown._replace(digits=_DIGITS))
 
 
@@ -355,7 +330,7 @@ def _is_even(direction: Direction) -> bool:
     return len(values) < len(direction.values) or all(isclose(step, steps[0], rel_tol=1e-6) for step in steps)
 
 
-def map_document(answer: MapAnswer) -> JsonDocument:
+def map_document(answer: MapAnswer) -> blocks.JsonDocument:
     """Document of `busplan map --format json`."""
     return document(
         "map",
@@ -371,7 +346,7 @@ def map_document(answer: MapAnswer) -> JsonDocument:
     )
 
 
-def _record(answer: MapAnswer, cell: Cell) -> Record:
+def _record(answer: MapAnswer, cell: Cell) -> blocks.Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
     safety = answer.safety.figure
     return {

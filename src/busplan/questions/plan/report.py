@@ -5,75 +5,52 @@ from typing import Any
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES
 from busplan.english import listed, nouns
-from busplan.forms.blocks import (
-    Block,
-    Cell,
-    Code,
-    Part,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    Table,
-    TableColumn,
-    TableRow,
-    Words,
-    attribute_value,
-)
+from busplan.forms import blocks
 from busplan.forms.numbers import MISSING, period_value
 from busplan.profile.edit import whole
 from busplan.profile.kinds import flat
-from busplan.questions.base.sentences import (
-    NewValues,
-    document,
-    fields,
-    margin_parts,
-    reset_sentence,
-    settings_sentence,
-    warning_sentences,
-    with_profile,
-)
+from busplan.questions.base import sentences
 from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.sections.base import TRANSACTION_KINDS
 
 
-def plan_report(plan: PlanAnswer) -> Report:
+def plan_report(plan: PlanAnswer) -> blocks.Report:
     """Report of `plan`: the recommendation, or what stands in its way, and a row for each step of the search."""
     records = [_record(plan, option) for option in plan.options]
     rows = [{**record, "changes": [f"{key}={value}" for key, value in flat(record["changes"])]} for record in records]
-    return Report(
-        Sentence(("Plan of ", Code(plan.profile.name))),
+    return blocks.Report(
+        blocks.Sentence(("Plan of ", blocks.Code(plan.profile.name))),
         tuple(_blocks(plan)),
-        document(
+        sentences.document(
             "plan",
             profile=plan.profile.name,
-            goal=fields(plan.options[0].deciding, "nodes", "axes"),
+            goal=sentences.fields(plan.options[0].deciding, "nodes", "axes"),
             free=[freedom.name for freedom in plan.free],
-            **fields(plan, "period_is_kept", "recommended_changes"),
+            **sentences.fields(plan, "period_is_kept", "recommended_changes"),
             binding=None if plan.binding is None else {"constraint": plan.binding.key, "reason": plan.binding.why},
-            relaxations=[fields(relaxation, "relaxed", "changes") for relaxation in plan.relaxations],
+            relaxations=[sentences.fields(relaxation, "relaxed", "changes") for relaxation in plan.relaxations],
             options=records,
         ),
-        with_profile(plan.profile.name, rows),
+        sentences.with_profile(plan.profile.name, rows),
     )
 
 
-def _blocks(plan: PlanAnswer) -> Iterator[Block]:
+def _blocks(plan: PlanAnswer) -> Iterator[blocks.Block]:
     yield _headline(plan)
     yield from (_relaxed(plan, relaxation) for relaxation in plan.relaxations)
-    yield from warning_sentences(plan.warnings)
-    yield from reset_sentence(plan.after_reset)
+    yield from sentences.warning_sentences(plan.warnings)
+    yield from sentences.reset_sentence(plan.after_reset)
     yield _options_table(plan)
     if idle := [option.title.removeprefix("+ ") for option in plan.options if _is_idle(plan, option)]:
-        yield Sentence((f"No help: {', '.join(idle)}.",))
+        yield blocks.Sentence((f"No help: {', '.join(idle)}.",))
     mark = "" if plan.recommended is None else "* recommended. "
     circle = " No circle was run: a plan is of the bus alone." if plan.profile.asks_for_circle else ""
-    yield Sentence((f"{mark}'Held by' names the limit that keeps a row from fitting.{circle}",))
+    yield blocks.Sentence((f"{mark}'Held by' names the limit that keeps a row from fitting.{circle}",))
 
 
-def settings(meanings: Mapping[str, str], changes: NewValues) -> Sentence:
+def settings(meanings: Mapping[str, str], changes: sentences.NewValues) -> blocks.Sentence:
     """Write changes as in a profile.
 
     Examples
@@ -83,26 +60,28 @@ def settings(meanings: Mapping[str, str], changes: NewValues) -> Sentence:
     'bus.nodes = 20, bus.speed = "S400" (if all nodes support it)'
     """
     # The number of nodes is the goal here, so the note on a second bus does not apply.
-    return settings_sentence(changes, meanings={key: words for key, words in meanings.items() if key != "bus.nodes"})
+    return sentences.settings_sentence(
+        changes, meanings={key: words for key, words in meanings.items() if key != "bus.nodes"}
+    )
 
 
-def _headline(plan: PlanAnswer) -> Sentence:
+def _headline(plan: PlanAnswer) -> blocks.Sentence:
     option, subject = plan.recommended, _goal(plan)
     if option is None or plan.binding is not None:
-        why = ShownValue("" if plan.binding is None else plan.binding.why, "why")
-        none = Words("NO PLAN", "fails")
-        return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
-    margin = (" with a corrected margin of ", *margin_parts(option.deciding)) if option.deciding.terms else ()
-    result = (Words("fits", "passes"), *margin, ".")
+        why = blocks.ShownValue("" if plan.binding is None else plan.binding.why, "why")
+        none = blocks.Words("NO PLAN", "fails")
+        return blocks.Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
+    margin = (" with a corrected margin of ", *sentences.margin_parts(option.deciding)) if option.deciding.terms else ()
+    result = (blocks.Words("fits", "passes"), *margin, ".")
     if not option.changes:
         if not plan.wanted:
-            return Sentence((*subject, ": nothing to change; it ", *result), "passes")
+            return blocks.Sentence((*subject, ": nothing to change; it ", *result), "passes")
         written: dict[str, Any] = dict(flat({key: whole(value) for key, value in plan.wanted.items()}))
         wanted = settings(plan.meanings, written)
-        return Sentence((*subject, ": ", *wanted.parts, " is all that changes; it ", *result), "passes")
+        return blocks.Sentence((*subject, ": ", *wanted.parts, " is all that changes; it ", *result), "passes")
     first = "" if plan.period_is_kept else f"the period must change: no change of {_freed(plan, PERIOD)} is enough; "
     changes = settings(plan.meanings, option.changes)
-    return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
+    return blocks.Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
 
 def _freed(plan: PlanAnswer, before: str | None = None) -> str:
@@ -112,39 +91,39 @@ def _freed(plan: PlanAnswer, before: str | None = None) -> str:
     return listed(labels, "and") if labels else "anything else"
 
 
-def _relaxed(plan: PlanAnswer, relaxation: Relaxation) -> Sentence:
+def _relaxed(plan: PlanAnswer, relaxation: Relaxation) -> blocks.Sentence:
     """Say what would be enough, and what to set then."""
     changes = settings(plan.meanings, relaxation.changes)
-    return Sentence((f"Enough would be to free the {relaxation.label}: ", *changes.parts, "."))
+    return blocks.Sentence((f"Enough would be to free the {relaxation.label}: ", *changes.parts, "."))
 
 
-def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
+def _goal(plan: PlanAnswer) -> tuple[blocks.Part, ...]:
     """The goal of the plan."""
     goal, figures = plan.goal, plan.options[0].deciding
     if not figures.terms:
-        return (Code(goal.name),)
+        return (blocks.Code(goal.name),)
     return (
-        *(Code(goal.name), " with "),
-        *(attribute_value(NODES, figures), f" {nouns(figures.nodes, 'node')} ("),
-        *(attribute_value(AXES, figures), f" {nouns(figures.axes, 'axis')}) at "),
+        *(blocks.Code(goal.name), " with "),
+        *(blocks.attribute_value(NODES, figures), f" {nouns(figures.nodes, 'node')} ("),
+        *(blocks.attribute_value(AXES, figures), f" {nouns(figures.axes, 'axis')}) at "),
         period_value(goal.cycle.period_us),
     )
 
 
-def _record(plan: PlanAnswer, option: Option) -> Record:
+def _record(plan: PlanAnswer, option: Option) -> blocks.Record:
     figures, profile, others = option.deciding, option.profile, option.others
     values = figures.values()
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
-        **fields(figures, "timing_model", "verdict", "fits"),
+        **sentences.fields(figures, "timing_model", "verdict", "fits"),
         "fits_other_model": all(model.fits for model in others) if others else None,
         "margin_us": figures.margin_us,
         "margin_other_model_us": min((model.margin_us for model in others if profile.has_cycle), default=None),
-        **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
+        **sentences.fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
         "held_by": option.held_by,
-        **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
+        **sentences.fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
         **{key: values[key] for key in figures.bus_figures.planned},
         # Of the first nodes; a bus of messages alone has none.
@@ -155,20 +134,20 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
     }
 
 
-def _options_table(plan: PlanAnswer) -> Table:
+def _options_table(plan: PlanAnswer) -> blocks.Table:
     """Settings and results of each step that changes something; the recommended one has a mark."""
     has_counts = any(option.deciding.safe_nodes is not None for option in plan.options)
     columns = (
-        TableColumn("free to change", kind="words"),
-        TableColumn("", kind="words"),
-        TableColumn("set", kind="words", wraps=True),
-        TableColumn("largest term", kind="words", rank=2),
-        TableColumn("held by", kind="words"),
-        TableColumn(MARGIN_CORRECTED.label, "us"),
-        *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes") if has_counts),
+        blocks.TableColumn("free to change", kind="words"),
+        blocks.TableColumn("", kind="words"),
+        blocks.TableColumn("set", kind="words", wraps=True),
+        blocks.TableColumn("largest term", kind="words", rank=2),
+        blocks.TableColumn("held by", kind="words"),
+        blocks.TableColumn(MARGIN_CORRECTED.label, "us"),
+        *(blocks.TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes") if has_counts),
     )
     shown = (option for option in plan.options if not _is_idle(plan, option))
-    return Table(columns, tuple(_row(option, has_counts=has_counts) for option in shown), heads=2)
+    return blocks.Table(columns, tuple(_row(option, has_counts=has_counts) for option in shown), heads=2)
 
 
 def _is_idle(plan: PlanAnswer, option: Option) -> bool:
@@ -177,14 +156,14 @@ def _is_idle(plan: PlanAnswer, option: Option) -> bool:
     return place > 0 and option.changes == plan.options[place - 1].changes
 
 
-def _row(option: Option, *, has_counts: bool) -> TableRow:
-    cells: tuple[Cell, ...] = (
+def _row(option: Option, *, has_counts: bool) -> blocks.TableRow:
+    cells: tuple[blocks.Cell, ...] = (
         option.title,
         "*" * option.recommended,
-        settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
+        sentences.settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
         option.deciding.bus_figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
-        ShownValue(option.held_by, "held_by"),
-        Sentence(margin_parts(option.deciding, unit=False)) if option.deciding.terms else MISSING,
-        *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES) if has_counts),
+        blocks.ShownValue(option.held_by, "held_by"),
+        blocks.Sentence(sentences.margin_parts(option.deciding, unit=False)) if option.deciding.terms else MISSING,
+        *(blocks.attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES) if has_counts),
     )
-    return TableRow(cells, highlighted=option.recommended)
+    return blocks.TableRow(cells, highlighted=option.recommended)

@@ -8,19 +8,7 @@ import numpy as np
 
 from busplan.buses.figure import EXCEEDED, TIMING_MODEL, VERDICT, Figure
 from busplan.english import nouns
-from busplan.forms.blocks import (
-    Code,
-    Record,
-    Sentence,
-    ShownValue,
-    Table,
-    TableColumn,
-    TableRow,
-    count_value,
-    figure_value,
-    joined,
-    sentence,
-)
+from busplan.forms import blocks
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.sweep.rows import plain_rows
 from busplan.questions.sweep.table import Columns, Sweep, column_figures
@@ -55,7 +43,7 @@ def default_columns(sweep: Sweep) -> tuple[str, ...]:
     return (*_RANKS, *of_groups, *(key for key in _OF_CIRCLES if key in sweep.columns))
 
 
-def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
+def sentences(sweep: Sweep, table: Columns) -> Iterator[blocks.Sentence]:
     """How many points there are, and how many fit.
 
     Parameters
@@ -66,26 +54,30 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
         All its columns.
     """
     points = sweep.grid.points
-    head = sentence(f"{{}}: {{}} {nouns(points, 'point')}; ", Code(sweep.profile.name), _points(points, "points"))
+    head = blocks.sentence(
+        f"{{}}: {{}} {nouns(points, 'point')}; ", blocks.Code(sweep.profile.name), _points(points, "points")
+    )
     fitting = (
-        sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(rows[VERDICT.key] == FITS)))
+        blocks.sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(rows[VERDICT.key] == FITS)))
         if model == sweep.deciding_model
-        else sentence(f"{{}} fit by the {model} model", _points(np.sum(rows["fits"])))
+        else blocks.sentence(f"{{}} fit by the {model} model", _points(np.sum(rows["fits"])))
         for model, rows in _by_model(sweep, table)
     )
-    yield joined(head, joined(*fitting, by=", "), Sentence((".",)), by="")
+    yield blocks.joined(head, blocks.joined(*fitting, by=", "), blocks.Sentence((".",)), by="")
     # Settings of the bus and the circle are the same under every model.
     _, first = next(_by_model(sweep, table))
     if sweep.circle:
         yield from _circles(sweep, table)
     yield from payload_sentences(sweep.profile, sweep.grid.axes)
     if sweep.group:
-        yield sentence("Axes are counted with more nodes of {}, with the other groups unchanged.", Code(sweep.group))
+        yield blocks.sentence(
+            "Axes are counted with more nodes of {}, with the other groups unchanged.", blocks.Code(sweep.group)
+        )
     safety = sweep.safety.figure
     unsafe = 0 if safety is None else np.sum(~first[safety.key].astype(bool))
     if unsafe and safety is not None:
         words = f"At {{}} {nouns(int(unsafe), 'point')} the {sweep.safety.setting} is unsafe ({safety.key})."
-        yield sentence(words, _points(unsafe), state="warns")
+        yield blocks.sentence(words, _points(unsafe), state="warns")
 
 
 def _by_model(sweep: Sweep, table: Columns) -> Iterator[tuple[str, Columns]]:
@@ -97,30 +89,31 @@ def _by_model(sweep: Sweep, table: Columns) -> Iterator[tuple[str, Columns]]:
     )
 
 
-def _points(number: float, key: str = "") -> ShownValue:
-    return count_value(int(number), key, grouped=True)
+def _points(number: float, key: str = "") -> blocks.ShownValue:
+    return blocks.count_value(int(number), key, grouped=True)
 
 
-def _circles(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
+def _circles(sweep: Sweep, table: Columns) -> Iterator[blocks.Sentence]:
     """Points whose circle holds every tolerance, under each timing model."""
     passed = {model: rows["passed"].tolist() for model, rows in _by_model(sweep, table)}
     unjudged = next(iter(passed.values())).count(None)
     yield from _unjudged(unjudged)
     if unjudged < sweep.grid.points:
         counts = (
-            sentence(f"{{}} by the {model} model", _points(results.count(True))) for model, results in passed.items()
+            blocks.sentence(f"{{}} by the {model} model", _points(results.count(True)))
+            for model, results in passed.items()
         )
-        head = Sentence(("The circle holds every tolerance at ",))
-        yield joined(head, joined(*counts, by=" and "), Sentence((".",)), by="")
+        head = blocks.Sentence(("The circle holds every tolerance at ",))
+        yield blocks.joined(head, blocks.joined(*counts, by=" and "), blocks.Sentence((".",)), by="")
 
 
-def _unjudged(points: int) -> Iterator[Sentence]:
+def _unjudged(points: int) -> Iterator[blocks.Sentence]:
     if points:
         words = "The circle is not judged at {}: no contour tolerance is asked for, or no error source matters."
-        yield sentence(words, _points(points), state="warns")
+        yield blocks.sentence(words, _points(points), state="warns")
 
 
-def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[Sentence, Table]:
+def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[blocks.Sentence, blocks.Table]:
     """The first rows, after how many there are; headings are the names of the columns.
 
     Parameters
@@ -138,18 +131,18 @@ def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[Sente
     records = plain_rows(sweep, {name: table[name] for name in columns}, np.arange(total)[:most])
     shown, words = _points(len(records)), f"{nouns(total, 'row')}."
     return (
-        sentence(f"{{}} of {{}} {words}", shown, _points(total))
+        blocks.sentence(f"{{}} of {{}} {words}", shown, _points(total))
         if len(records) < total
-        else sentence(f"{{}} {words}", shown),
-        Table(
+        else blocks.sentence(f"{{}} {words}", shown),
+        blocks.Table(
             tuple(_column(name, figures.get(name), rank=_RANKS.get(name, 0)) for name in columns),
-            tuple(TableRow(tuple(_cells(record, figures))) for record in records),
+            tuple(blocks.TableRow(tuple(_cells(record, figures))) for record in records),
             heads=columns.index(TIMING_MODEL.key) + 1,
         ),
     )
 
 
-def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sentence]:
+def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[blocks.Sentence]:
     """Say that the payload does not follow the axes of a node, where these vary.
 
     Parameters
@@ -163,25 +156,25 @@ def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sen
         if nodes.node_key("axes") not in varied or nodes.payload.follows_axes:
             continue
         section = f"group.{nodes.name}" if nodes.name else "payload"
-        keys = Code(f"{section}.read_bytes_per_axis"), Code(f"{section}.write_bytes_per_axis")
-        yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
+        keys = blocks.Code(f"{section}.read_bytes_per_axis"), blocks.Code(f"{section}.write_bytes_per_axis")
+        yield blocks.sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
 
 
-def _column(name: str, figure: Figure | None, *, rank: int) -> TableColumn:
+def _column(name: str, figure: Figure | None, *, rank: int) -> blocks.TableColumn:
     if figure is None:
-        return TableColumn(name)
+        return blocks.TableColumn(name)
     # The name ends in any other unit.
     unit = "%" if figure.column == "%" else ""
-    return TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures", rank=rank)
+    return blocks.TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures", rank=rank)
 
 
-def _cells(record: Record, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:
+def _cells(record: blocks.Record, figures: Mapping[str, Figure]) -> Iterator[blocks.ShownValue]:
     for name, value in record.items():
         figure = figures.get(name)
         if figure is None:
-            yield ShownValue(value, name)
+            yield blocks.ShownValue(value, name)
         else:
-            shown = figure_value(figure, value)
+            shown = blocks.figure_value(figure, value)
             # In the unit of the column's name; a length in mm has three more decimals than one in um.
             finer = 3 if figure.unit == "mm" and figure.column == "um" else 0
             yield shown._replace(unit=figure.unit or shown.unit, decimals=shown.decimals and shown.decimals + finer)

@@ -7,36 +7,9 @@ from typing import Final
 
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
 from busplan.english import nouns
-from busplan.forms.blocks import (
-    Chart,
-    Code,
-    JsonDocument,
-    Part,
-    Record,
-    Report,
-    Sentence,
-    ShownValue,
-    Swatch,
-    Table,
-    TableColumn,
-    TableRow,
-    attribute_value,
-    count_value,
-    figure_value,
-    joined,
-    sentence,
-    state_of,
-)
-from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
+from busplan.forms import blocks, charts
 from busplan.forms.numbers import figure_text, period_value, sentence_text, with_unit
-from busplan.questions.base.sentences import (
-    document,
-    fields,
-    margin_words,
-    safety_record,
-    time_lines,
-    warning_sentences,
-)
+from busplan.questions.base import sentences
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.timeline.events import (
     EVENTS,
@@ -56,23 +29,23 @@ _MOST_LANES: Final = 128
 """Most lanes of nodes; with more nodes, neighbours share a lane."""
 _MOST_BARS: Final = 400
 """Most events with a bar each; of more, each transaction has one."""
-_NEEDED: Final = Entry("long-gap", "needed", "#")
-_LEFT: Final = Entry("fits", "margin", ".")
-_BEYOND: Final = Entry("late", "beyond the slice", "!")
-_REST: Final = Entry("track", "rest of the period", "-")
-_WINDOW: Final = Entry("window", "shown below", "^")
+_NEEDED: Final = charts.Entry("long-gap", "needed", "#")
+_LEFT: Final = charts.Entry("fits", "margin", ".")
+_BEYOND: Final = charts.Entry("late", "beyond the slice", "!")
+_REST: Final = charts.Entry("track", "rest of the period", "-")
+_WINDOW: Final = charts.Entry("window", "shown below", "^")
 
 
-def timeline_report(schedule: Schedule) -> Report:
+def timeline_report(schedule: Schedule) -> blocks.Report:
     """Report of `timeline`: whether the cycle fits, the cycle to scale, and the total of each kind of event."""
     needs, summary = schedule.needs, _headline(schedule)
-    return Report(
-        Sentence(("Timeline of ", Code(schedule.profile.name))),
+    return blocks.Report(
+        blocks.Sentence(("Timeline of ", blocks.Code(schedule.profile.name))),
         (
             summary,
-            *warning_sentences(schedule.warnings),
+            *sentences.warning_sentences(schedule.warnings),
             *([_margins(needs)] if len(needs) > 1 else []),
-            *(Sentence((words,)) for words in _cycle_words(schedule)),
+            *(blocks.Sentence((words,)) for words in _cycle_words(schedule)),
             _chart(schedule, title=sentence_text(summary)),
             _totals_table(schedule),
         ),
@@ -81,29 +54,35 @@ def timeline_report(schedule: Schedule) -> Report:
     )
 
 
-def _headline(schedule: Schedule) -> Sentence:
+def _headline(schedule: Schedule) -> blocks.Sentence:
     """Say the verdict as `capacity` does; under a model that does not decide, what it leaves of the slice."""
     figures = schedule.figures
-    name: tuple[Part, ...] = (Code(schedule.profile.name), " at ", period_value(figures.period_us), ": ")
+    name: tuple[blocks.Part, ...] = (blocks.Code(schedule.profile.name), " at ", period_value(figures.period_us), ": ")
     which = " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else ""
     if figures.verdict is None:
-        words = (*margin_words(figures, schedule.broken_limits), f" by the {figures.timing_model} model{which}")
-        return Sentence(
-            (*name, *words, ", which does not affect the verdict."), state_of(figures.fits and figures.safe)
+        words = (
+            *sentences.margin_words(figures, schedule.broken_limits),
+            f" by the {figures.timing_model} model{which}",
         )
-    state = state_of(figures.verdict == FITS and figures.safe)
-    verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
-    lines = (f"{label} {sentence_text(line)}" for label, line in time_lines(figures, schedule.profile))
+        return blocks.Sentence(
+            (*name, *words, ", which does not affect the verdict."), blocks.state_of(figures.fits and figures.safe)
+        )
+    state = blocks.state_of(figures.verdict == FITS and figures.safe)
+    verdict = blocks.figure_value(VERDICT, figures.verdict)._replace(state=state)
+    lines = (f"{label} {sentence_text(line)}" for label, line in sentences.time_lines(figures, schedule.profile))
     said = f" by the {figures.timing_model} model{which}; {'; '.join((*schedule.broken_limits, *lines))}."
-    return Sentence((*name, verdict, said), state)
+    return blocks.Sentence((*name, verdict, said), state)
 
 
-def _margins(needs: Sequence[ModelNeeds]) -> Sentence:
+def _margins(needs: Sequence[ModelNeeds]) -> blocks.Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(f"{{}} by the {model.timing_model} model", figure_value(MARGIN, model.free_us)) for model in needs
+        blocks.sentence(f"{{}} by the {model.timing_model} model", blocks.figure_value(MARGIN, model.free_us))
+        for model in needs
     )
-    return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
+    return blocks.joined(
+        blocks.Sentence(("Margin of the slice: ",)), blocks.joined(*margins, by=", "), blocks.Sentence((".",)), by=""
+    )
 
 
 def _cycle_words(schedule: Schedule) -> Iterator[str]:
@@ -136,36 +115,36 @@ def _cycle_words(schedule: Schedule) -> Iterator[str]:
     yield f"{meet} every {schedule.cycles} cycles; this is {drawn}. {listed}"
 
 
-def _chart(schedule: Schedule, *, title: str) -> Chart:
+def _chart(schedule: Schedule, *, title: str) -> blocks.Chart:
     """The whole period to scale, and below it the window or, without one, the cycle without its idle rest."""
     window = schedule._replace(to_us=schedule.used_us) if schedule.is_whole else schedule
     lanes, legend = _lanes(window)
     words = _window_words(window)
     text = sentence_text(words)
-    drawing = Drawing(title, (_period(schedule), lanes), (text,), text, has_characters=True)
-    return Chart(drawing, words, Sentence((legend,)) if legend else None)
+    drawing = charts.Drawing(title, (_period(schedule), lanes), (text,), text, has_characters=True)
+    return blocks.Chart(drawing, words, blocks.Sentence((legend,)) if legend else None)
 
 
-def _window_words(window: Schedule) -> Sentence:
+def _window_words(window: Schedule) -> blocks.Sentence:
     """Say which nodes and which part of the cycle are shown, and which distance on the wire each node counts."""
     nodes, path, cycle = window.figures.nodes, window.path, "the cycle"
     if window.number is not None and window.cycles > 1:
         cycle = f"cycle {window.drawn} of {window.cycles}"
     setup = ", ".join((nouns(nodes, "node"), *window.setup))
-    return sentence(
+    return blocks.sentence(
         f"{{}} {setup}; {{}} to {{}} of {cycle}{path and f', {path}'}",
-        count_value(nodes, "nodes"),
-        ShownValue(window.from_us, "from_us", "", TOTAL.decimals),
-        ShownValue(window.to_us, "to_us", "us", TOTAL.decimals),
+        blocks.count_value(nodes, "nodes"),
+        blocks.ShownValue(window.from_us, "from_us", "", TOTAL.decimals),
+        blocks.ShownValue(window.to_us, "to_us", "us", TOTAL.decimals),
     )
 
 
-def _period(schedule: Schedule) -> Panel:
+def _period(schedule: Schedule) -> charts.Panel:
     """The whole period, transaction by transaction, and what each timing model needs and leaves of its slice."""
     figures, needs, end_us = schedule.figures, schedule.needs, schedule.end_us
     slice_us, period_us = figures.available_us, figures.period_us
     scale_us = max(period_us, end_us, *(slice_us - model.free_us for model in needs))
-    lanes = [Lane("cycle", (*_transactions(schedule, schedule.cycle_events), *_part(_REST, end_us, period_us)))]
+    lanes = [charts.Lane("cycle", (*_transactions(schedule, schedule.cycle_events), *_part(_REST, end_us, period_us)))]
     for model in needs:
         used_us = slice_us - model.free_us
         parts = (
@@ -174,10 +153,10 @@ def _period(schedule: Schedule) -> Panel:
             *_part(_BEYOND, slice_us, used_us),
             *_part(_REST, max(used_us, slice_us), period_us),
         )
-        left = with_unit(figure_value(MARGIN, abs(model.free_us)))
+        left = with_unit(blocks.figure_value(MARGIN, abs(model.free_us)))
         words = f"{left} short" if model.free_us < 0 else f"margin {left}"
-        needed = with_unit(figure_value(REQUIRED, used_us))
-        lanes.append(Lane(model.timing_model, parts, f"{needed} needed, {words}", is_thin=True))
+        needed = with_unit(blocks.figure_value(REQUIRED, used_us))
+        lanes.append(charts.Lane(model.timing_model, parts, f"{needed} needed, {words}", is_thin=True))
     slice_words, title = _time(slice_us), f"The period of {_time(period_us)} us"
     if schedule.overruns:
         lanes.append(_over(schedule))
@@ -185,11 +164,11 @@ def _period(schedule: Schedule) -> Panel:
     else:
         title = f"{title} and its slice of {slice_words} us"
     if not schedule.is_whole:
-        lanes.append(Lane("window", tuple(_part(_WINDOW, schedule.from_us, schedule.to_us)), is_thin=True))
-    return Panel(_plot(schedule, scale_us, lanes), title)
+        lanes.append(charts.Lane("window", tuple(_part(_WINDOW, schedule.from_us, schedule.to_us)), is_thin=True))
+    return charts.Panel(_plot(schedule, scale_us, lanes), title)
 
 
-def _lanes(window: Schedule) -> tuple[Panel, str]:
+def _lanes(window: Schedule) -> tuple[charts.Panel, str]:
     """The window, and what a bar is: a lane for each event if they are few, else one for the bus and for each node."""
     title, events, legend = f"{_time(window.from_us)} to {_time(window.to_us)} us", window.events, ""
     has_each = len(events) <= _MOST_EVENT_LANES
@@ -199,7 +178,7 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         is_single = not more and node is not None
         title = f"{f'The {kind} of node {node}' if is_single else 'Events'}, {title}"
         lanes = [
-            Lane(
+            charts.Lane(
                 event.label if is_single else _title(event),
                 tuple(_events(window, [event])),
                 f"{_time(event.duration_us)} us",
@@ -223,19 +202,21 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         labels = ["bus", *(" to ".join(pair).replace("node ", "nodes ", len(pair) - 1) for pair in ends)]
         labels = [label.replace(" to node ", " to ") for label in labels]
         drawn = ((label, tuple(draw(window, in_lane))) for label, in_lane in zip(labels, of_lane, strict=True))
-        lanes = [Lane(label, bars) for label, bars in drawn if bars]
+        lanes = [charts.Lane(label, bars) for label, bars in drawn if bars]
     if window.overruns and window.to_us > window.figures.available_us:
         lanes.append(_over(window))
     plot = _plot(window, window.to_us, lanes, start_us=window.from_us, is_beside=not has_each)
-    return Panel(plot, title), legend
+    return charts.Panel(plot, title), legend
 
 
-def _plot(schedule: Schedule, end_us: float, lanes: Sequence[Lane], *, start_us: float = 0.0, **layout: bool) -> Lanes:
+def _plot(
+    schedule: Schedule, end_us: float, lanes: Sequence[charts.Lane], *, start_us: float = 0.0, **layout: bool
+) -> charts.Lanes:
     """Lanes on a scale of time, with the end of the slice if the scale goes beyond it."""
     slice_us = schedule.figures.available_us
-    end = Entry("edge" if schedule.overruns else "limit", "end of the slice", shape="line")
-    guides = (Guide(end, x=slice_us),) if start_us < slice_us < end_us else ()
-    return Lanes(numbers("us", start_us, end_us), tuple(lanes), guides, **layout)
+    end = charts.Entry("edge" if schedule.overruns else "limit", "end of the slice", shape="line")
+    guides = (charts.Guide(end, x=slice_us),) if start_us < slice_us < end_us else ()
+    return charts.Lanes(charts.numbers("us", start_us, end_us), tuple(lanes), guides, **layout)
 
 
 def _names_of_nodes(window: Schedule) -> list[str]:
@@ -246,23 +227,23 @@ def _names_of_nodes(window: Schedule) -> list[str]:
     return names if len(names) == nodes else [f"node {number}" for number in range(1, nodes + 1)]
 
 
-def _over(schedule: Schedule) -> Lane:
-    return Lane("over", tuple(_part(_BEYOND, schedule.figures.available_us, schedule.end_us)), is_thin=True)
+def _over(schedule: Schedule) -> charts.Lane:
+    return charts.Lane("over", tuple(_part(_BEYOND, schedule.figures.available_us, schedule.end_us)), is_thin=True)
 
 
-def _part(entry: Entry, start_us: float, end_us: float) -> Iterator[Span]:
+def _part(entry: charts.Entry, start_us: float, end_us: float) -> Iterator[charts.Span]:
     """A part of the period, if it takes any time."""
     if end_us > start_us:
-        yield Span(entry, start_us, end_us, _tip(entry.words, start_us, end_us))
+        yield charts.Span(entry, start_us, end_us, _tip(entry.words, start_us, end_us))
 
 
-def _events(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]:
+def _events(schedule: Schedule, events: Sequence[Event]) -> Iterator[charts.Span]:
     """A bar for each event."""
     for event in events:
         yield _bar(schedule, event.kind, _title(event), event.start_us, event.end_us)
 
 
-def _transactions(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]:
+def _transactions(schedule: Schedule, events: Sequence[Event]) -> Iterator[charts.Span]:
     """A bar for each transaction, and for each event of the bus."""
 
     def owner(numbered: tuple[int, Event]) -> tuple[object, ...]:
@@ -277,9 +258,9 @@ def _transactions(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]
         yield _bar(schedule, kind, title, first.start_us, more[-1][1].end_us if more else first.end_us)
 
 
-def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: float) -> Span:
+def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: float) -> charts.Span:
     look = schedule.kinds[kind]
-    return Span(Entry(look.ink, look.label, look.mark), start_us, end_us, _tip(title, start_us, end_us))
+    return charts.Span(charts.Entry(look.ink, look.label, look.mark), start_us, end_us, _tip(title, start_us, end_us))
 
 
 def _title(event: Event) -> str:
@@ -293,64 +274,69 @@ def _tip(title: str, start_us: float, end_us: float) -> str:
 
 def _time(time_us: float) -> str:
     """Write a time as in tables, without its unit."""
-    return figure_text(figure_value(TOTAL, time_us))
+    return figure_text(blocks.figure_value(TOTAL, time_us))
 
 
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
 
-def _totals_table(schedule: Schedule) -> Table:
+def _totals_table(schedule: Schedule) -> blocks.Table:
     """Total time of each kind of event in the window."""
     whole = "the cycle" if schedule.overruns else "the slice"
     part = whole if schedule.is_whole else "the window"
-    return Table(
+    return blocks.Table(
         (
-            *(TableColumn("kind", kind="words"), TableColumn("source", kind="words", rank=1)),
-            *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
+            *(blocks.TableColumn("kind", kind="words"), blocks.TableColumn("source", kind="words", rank=1)),
+            *(blocks.TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(schedule, total) for total in totals(schedule)),
-        sentence(f"Use of {part}, {{}}", ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)),
+        blocks.sentence(
+            f"Use of {part}, {{}}", blocks.ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)
+        ),
     )
 
 
-def _total_row(schedule: Schedule, total: Total) -> TableRow:
+def _total_row(schedule: Schedule, total: Total) -> blocks.TableRow:
     kind = schedule.kinds[total.kind]
-    values = (attribute_value(figure, total) for figure in _TOTAL_FIGURES)
-    return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
+    values = (blocks.attribute_value(figure, total) for figure in _TOTAL_FIGURES)
+    return blocks.TableRow((blocks.Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
-def _document(schedule: Schedule) -> JsonDocument:
+def _document(schedule: Schedule) -> blocks.JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
     figures, distinct = schedule.figures, schedule.distinct
     values = figures.values()
-    return document(
+    return sentences.document(
         "timeline",
         profile=schedule.profile.name,
-        **fields(figures, "timing_model", "period_us", "nodes"),
+        **sentences.fields(figures, "timing_model", "period_us", "nodes"),
         **{key: values[key] for key in figures.bus_figures.headings},
         cycle=schedule.drawn,
         common_multiple=schedule.cycles,
         distinct_cycles=None if distinct is None else [cycle._asdict() for cycle in distinct],
         required_us=schedule.required_us,
         available_us=figures.available_us,
-        **fields(schedule, "margin_us", "margin_corrected_us", "uncertainty_us"),
-        **fields(figures, "exceeded", "not_shown", "fits", "verdict"),
-        **safety_record(figures),
+        **sentences.fields(schedule, "margin_us", "margin_corrected_us", "uncertainty_us"),
+        **sentences.fields(figures, "exceeded", "not_shown", "fits", "verdict"),
+        **sentences.safety_record(figures),
         warnings=list(schedule.warnings),
-        **fields(schedule, "from_us", "to_us"),
+        **sentences.fields(schedule, "from_us", "to_us"),
         margins=[model._asdict() for model in schedule.needs],
         events=_event_records(schedule),
         totals=[total._asdict() for total in totals(schedule)],
     )
 
 
-def _records(schedule: Schedule) -> list[Record]:
+def _records(schedule: Schedule) -> list[blocks.Record]:
     """One row for each event, with profile and timing model in front."""
     head = {"profile": schedule.profile.name, "timing_model": schedule.figures.timing_model}
     return [{**head, **record} for record in _event_records(schedule)]
 
 
-def _event_records(schedule: Schedule) -> list[Record]:
+def _event_records(schedule: Schedule) -> list[blocks.Record]:
     """One row for each event of the window."""
     keys = ("kind", "node", "transaction", "packet", "start_us", "end_us", "duration_us")
-    return [{**fields(event, *keys), "equation": schedule.kinds[event.kind].reference} for event in schedule.events]
+    return [
+        {**sentences.fields(event, *keys), "equation": schedule.kinds[event.kind].reference}
+        for event in schedule.events
+    ]
