@@ -191,12 +191,13 @@ def exact_safe_required_us(profile: busplan.Profile, nodes: int) -> Fraction:
 
     def execution_doubt_us(kind: str) -> float:
         own_us = execution["base_us"] + execution["per_byte_us"] * data["payload"][f"{kind}_bytes"]
-        by_grade = {"measured": 0.1 / sqrt(12), "derived": 1 / sqrt(3)}
+        by_grade = {"measured": 0.1 / sqrt(12), "derived": 1 / sqrt(3), "assumed": own_us / sqrt(3)}
         said_us = execution["uncertainty_us"]
         return float(by_grade.get(execution["grade"], 0.1 * own_us) if said_us is None else said_us)
 
     host_doubt_us = host["uncertainty_us"]
-    host_doubt_us = 0.1 * host["transaction_us"] if host_doubt_us is None else host_doubt_us
+    if host_doubt_us is None:
+        host_doubt_us = host["transaction_us"] * (1 / sqrt(3) if host["grade"] == "assumed" else 0.1)
     # The delay of all hops stands once in each arbitration, in each packet's data and in each acknowledge.
     hop_delays = nodes * sum({"split": 6, "concatenated": 5, "unified": 3}[answer] for answer in answers.values())
     hop_delays += 2 + 3 * retries + 2 * _starts(profile, nodes)
