@@ -148,6 +148,12 @@ def table_1_residuals_us() -> list[float]:
     return [us - fixed_us - 8 * (20 if size == 4 else 24 + size) / 393.216 for size, us in TABLE_1]
 
 
+def _host_doubt_us(host: dict[str, Any]) -> float:
+    """Standard uncertainty of the host's time [us]."""
+    share = 1 / sqrt(3) if host["grade"] == "assumed" else 0.1
+    return float(share * host["transaction_us"] if host["uncertainty_us"] is None else host["uncertainty_us"])
+
+
 def exact_safe_required_us(profile: busplan.Profile, nodes: int) -> Fraction:
     """What the slice must give for a cycle to be shown to fit; exact but for its bias and its uncertainty."""
     data = profile.model_dump()
@@ -195,9 +201,7 @@ def exact_safe_required_us(profile: busplan.Profile, nodes: int) -> Fraction:
         said_us = execution["uncertainty_us"]
         return float(by_grade.get(execution["grade"], 0.1 * own_us) if said_us is None else said_us)
 
-    host_doubt_us = host["uncertainty_us"]
-    if host_doubt_us is None:
-        host_doubt_us = host["transaction_us"] * (1 / sqrt(3) if host["grade"] == "assumed" else 0.1)
+    host_doubt_us = _host_doubt_us(host)
     # The delay of all hops stands once in each arbitration, in each packet's data and in each acknowledge.
     hop_delays = nodes * sum({"split": 6, "concatenated": 5, "unified": 3}[answer] for answer in answers.values())
     hop_delays += 2 + 3 * retries + 2 * _starts(profile, nodes)
@@ -223,7 +227,7 @@ def _safe_broadcasts_us(profile: busplan.Profile, nodes: int) -> Fraction:
     packets = nodes + 4 + cycle["retries"]
     with_gap = packets if cycle["broadcast_request"] == "priority" else packets - nodes
     gap_term_us = 2 * (63 - gap) / 98.304
-    step_us = 0.1 * host["transaction_us"] if host["uncertainty_us"] is None else host["uncertainty_us"]
+    step_us = _host_doubt_us(host)
 
     def at(steps: int) -> float:
         """The cycle with another time of the host, without starts: only the difference is used."""
