@@ -43,7 +43,7 @@ from busplan.sections.machine import DeliverySection
 from busplan.sections.profile import Profile
 
 Run = Callable[..., Any]
-KINDS = " or ".join(f'"{one}"' for one in kind_names())
+KINDS = [f'"{one}"' for one in kind_names()]
 
 RATES = (1.0, 2.0, 4.0)
 MOST_STATIONS = 40
@@ -459,7 +459,11 @@ def test_its_safe_stations_are_those_that_a_count_finds(doubted: Path, period_us
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"ring"\nnodes', '"rung"\nnodes', f'ring.toml:5:1: bus.kind = "rung": expected {KINDS} or "ring"'),
+        (
+            '"ring"\nnodes',
+            '"rung"\nnodes',
+            f'ring.toml:5:1: bus.kind = "rung": expected {", ".join(KINDS)} or "ring"; did you mean "ring"?',
+        ),
         (
             "nodes = 5",
             "nodes = 5\ngap_count = 5",
@@ -483,7 +487,8 @@ def test_a_name_is_registered_once_and_gone_afterwards(run: Run, ring_file: Path
     with registered(Ring()), pytest.raises(ValueError, match="called ring"), registered(Ring()):
         pass
     done = run("capacity", ring_file.name, cwd=ring_file.parent)
-    assert (done.returncode, done.stderr) == (2, f'ring.toml:5:1: bus.kind = "ring": expected {KINDS}\n')
+    expected = f"{', '.join(KINDS[:-1])} or {KINDS[-1]}"
+    assert (done.returncode, done.stderr) == (2, f'ring.toml:5:1: bus.kind = "ring": expected {expected}\n')
 
 
 def test_one_schema_serves_all_kinds_and_names_the_key(run: Run, ring: Path) -> None:

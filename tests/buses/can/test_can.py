@@ -473,9 +473,10 @@ def test_the_jitter_of_sync_reaches_the_circle() -> None:
 
 
 def test_the_expected_load_lies_between_no_stuff_bits_and_the_most() -> None:
-    least, most = (figures(profile(), model).own for model in ("no-stuffing", "worst-stuffing"))
-    expected = least["bus_load"] + 0.4 * (most["bus_load"] - least["bus_load"])
-    assert (least["expected_load"], most["expected_load"]) == pytest.approx((expected, expected))
+    models = "no-stuffing", "worst-stuffing"
+    least, most = (busplan.CanFigures.of(figures(profile(), model)) for model in models)
+    expected = least.bus_load + 0.4 * (most.bus_load - least.bus_load)
+    assert (least.expected_load, most.expected_load) == pytest.approx((expected, expected))
 
 
 def test_events_are_the_terms_with_what_blocks_and_what_interferes() -> None:

@@ -363,7 +363,7 @@ def test_fd_frames_without_a_switch_are_planned_without(tmp_path: Path) -> None:
     (figures, *_) = busplan.capacity(answer.profile).results
     # Two frames of 64 bytes in 5 ms, all of it at the nominal rate.
     us = 712 * 1000 / can_profile(answer).bus.bit_rate_kbit_s
-    assert busplan.CanFigures.of(figures).bus_load == pytest.approx(2 * us / 5000, rel=0.03)
+    assert busplan.CanMessageFigures.of(figures).bus_load == pytest.approx(2 * us / 5000, rel=0.03)
     assert busplan.measured(answer.profile, tmp_path / "drive.log").outside == ()
     # A plan with a switch of bit rate is not that of this machine.
     plan = answer.profile.model_dump(exclude_unset=True)
