@@ -60,7 +60,7 @@ def test_a_terminal_and_a_pipe_get_the_same_figures(run: Run, on_terminal: OnTer
         for columns in ("40", "80"):
             _, shown = on_terminal(*arguments, "--all", cwd=tmp_path, env={"TERM": "dumb", "COLUMNS": columns})
             # The last line of a terminal names the next command.
-            both = (re.split(r"\nnext\b", shown)[0], run(*arguments, "--all").stdout)
+            both = (re.split(r"\n *next\b", shown)[0], run(*arguments, "--all").stdout)
             here, there = ({word for word in text.split() if re.search(r"\d", word)} for text in both)
             assert here == there
 
