@@ -59,8 +59,8 @@ def test_a_terminal_and_a_pipe_get_the_same_figures(run: Run, on_terminal: OnTer
     for arguments in REPORTS:
         for columns in ("40", "80"):
             _, shown = on_terminal(*arguments, "--all", cwd=tmp_path, env={"TERM": "dumb", "COLUMNS": columns})
-            # The last line of a terminal names the next command.
-            both = (re.split(r"\n *next\b", shown)[0], run(*arguments, "--all").stdout)
+            # A terminal alone names the next commands, with the page that one of them writes.
+            both = (shown.replace("paper-4ms.html", ""), run(*arguments, "--all").stdout)
             here, there = ({word for word in text.split() if re.search(r"\d", word)} for text in both)
             assert here == there
 
