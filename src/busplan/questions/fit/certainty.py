@@ -50,10 +50,7 @@ class Certainty(NamedTuple):
 def certainty(cycle: BusCycle) -> Certainty:
     """Compute the corrected margin of a cycle, its uncertainty, and the time it needs to be shown to fit.
 
-    Parameters
-    ----------
-    cycle
-        A cycle under the timing model that decides. Its numbers may be arrays or traced numbers.
+    The cycle is one under the timing model that decides; its numbers may be arrays or traced numbers.
 
     References
     ----------

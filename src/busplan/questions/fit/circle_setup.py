@@ -110,13 +110,7 @@ def refusals(network: Network) -> tuple[Refused, ...]:
 
 
 def require_circle(network: Network) -> None:
-    """Refuse a circle that cannot be run.
-
-    Raises
-    ------
-    ParameterError
-        Its `refusals`.
-    """
+    """Refuse a circle that cannot be run: ParameterError of its `refusals`."""
     causes = refusals(network)
     if causes:
         raise ParameterError(*causes)
@@ -226,12 +220,8 @@ def delivery_of(network: Network) -> Delivery:
 def move_of(profile: Profile, settling_us: float | None) -> Move:
     """The move of a profile's circle.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    settling_us
-        Time of its lead-in: None on a trapezoid; infinite if the loops do not settle, which takes no lead-in [us].
+    `settling_us` is the time of its lead-in: None on a trapezoid; infinite if the loops do not settle, which takes no
+    lead-in [us].
     """
     circle = profile.circle
     return move_along(
@@ -275,12 +265,9 @@ def loop_axes(network: Network) -> tuple[Axis, Axis]:
 
 
 def path_steps(network: Network) -> int:
-    """Count the simulated steps of each axis; nothing is simulated [1].
+    """Number of simulated steps of each axis; nothing is simulated [1].
 
-    Raises
-    ------
-    ParameterError
-        The circle cannot be run.
+    ParameterError: the circle cannot be run.
     """
     require_circle(network)
     return path_setpoints(network) * loop_timing(network.profile).steps_per_period

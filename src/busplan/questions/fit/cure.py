@@ -136,14 +136,9 @@ class AtPeriod(NamedTuple):
 
 
 def best_register(network: Network, now: SmallestPeriod) -> SettingForPeriod | None:
-    """Find the setting of a register with which the smallest period is the shortest; None if none is worthwhile.
+    """Setting of a register with the shortest smallest period; None if none is worthwhile.
 
-    Parameters
-    ----------
-    network
-        The network; its own period plays no part.
-    now
-        Its smallest period as it is set.
+    `now` is the network's smallest period as it is set; its own period plays no part.
     """
     variants = Variants(network)
     settings = [setting for setting in network.bus.settings(network) if setting.cost == Cost.REGISTER]
@@ -203,19 +198,8 @@ def freedoms(network: Network) -> tuple[Freedom, ...]:
 def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collection[str] = ()) -> tuple[Freedom, ...]:
     """Freedoms of a plan, the cheapest first.
 
-    Parameters
-    ----------
-    network
-        The network.
-    names
-        Names of freedoms, or keys that one of them changes; None for all but payload and nodes.
-    kept
-        Keys that were given a value, which stays.
-
-    Raises
-    ------
-    BusplanError
-        The network has no freedom of that name, or its value was given.
+    `names` are freedoms, or keys that one of them changes; None for all but payload and nodes. `kept` are keys that
+    were given a value, which stays. BusplanError: the network has no such freedom, or its value was given.
     """
     possible = freedoms(network)
     still = [freedom for freedom in possible if not set(freedom.keys) <= set(kept)]
@@ -245,23 +229,9 @@ def search(
     """Change one thing at a time, the cheapest first, until every constraint of a plan holds.
 
     Of each thing the least change that is enough is taken; where none is, the one that comes nearest, and the next
-    thing is changed beside it. In the end, what is not needed beside the last change is left as it was.
-
-    Parameters
-    ----------
-    network
-        The network.
-    levels
-        Freedoms, the cheapest first.
-    kept
-        Keys that must stay.
-    variants
-        Those of the same network at another period, if they are known.
-
-    Returns
-    -------
-    list
-        The steps from the network as it is; the last one holds, or nothing of the levels is enough.
+    thing is changed beside it. In the end, what is not needed beside the last change is left as it was. The last of the
+    returned steps holds, or nothing of the `levels` is enough. `variants` are those of the same network at another
+    period, if they are known.
     """
     now = start = AtPeriod.of(network, variants)
     steps = [PlanStep(None, {}, tuple(start.unmet()))]
@@ -425,14 +395,9 @@ class Cure(NamedTuple):
 
 
 def cure(network: Network, variants: Variants | None = None) -> Cure:
-    """Find the change that mends a network, with the default freedoms of a plan.
+    """The change that mends a network, with the default freedoms of a plan.
 
-    Parameters
-    ----------
-    network
-        The network.
-    variants
-        Those of the same network at another period, if they are known.
+    `variants` are those of the same network at another period, if they are known.
     """
     steps = search(network, freed(network), variants=variants)
     last = steps[-1]
@@ -453,12 +418,9 @@ def changeable(network: Network) -> tuple[str, ...]:
 
 
 def nodes_for_axes(profile: Profile, axes: int) -> int:
-    """Nodes that a number of axes takes, with the profile's axes of each node [1].
+    """Nodes for a number of axes, with the axes of each node as in the profile [1].
 
-    Raises
-    ------
-    BusplanError
-        Nodes differ, so that axes do not say how many of which.
+    BusplanError: nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
         now = {group: int(group.nodes) * int(group.node.axes) for group in profile.node_groups}

@@ -59,23 +59,11 @@ class MostNodes(NamedTuple):
 
 
 def safe_nodes(network: Network, *, group: str = "", without: str | None = None) -> tuple[int, str]:
-    """Find the largest number of nodes that is shown to fit, with the reserve, on a bus with safe settings for them.
+    """Most nodes that are shown to fit, with the reserve, on a bus with safe settings, and the key of the limit.
 
     Each number of nodes is tried with its own cycle, bias, uncertainty and limits, and its own "optimal" gap count.
-
-    Parameters
-    ----------
-    network
-        The network; its own number of nodes plays no part.
-    group
-        Name of the group whose nodes are counted, the others as they are; empty where all nodes are alike.
-    without
-        Key of a limit that is left out, to find what binds next.
-
-    Returns
-    -------
-    tuple
-        Number of nodes [1], and the key of the limit.
+    `group` names the group whose nodes are counted, the others as they are; empty where all nodes are alike. `without`
+    is a limit that is left out, to find what binds next.
     """
     limits = [limit for limit in limits_to_be_safe(network) if limit.key != without]
     return most_nodes(network.varying(group).with_nodes, limits).words
@@ -84,17 +72,7 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
 def most_and_safe_nodes(
     with_nodes: Callable[[Number], Network], network: Network, *, model: str
 ) -> tuple[MostNodes, MostNodes | None]:
-    """Find the most nodes that fit, and that are shown to fit; None under a timing model that does not decide.
-
-    Parameters
-    ----------
-    with_nodes
-        As `most_nodes` takes it.
-    network
-        A network of the same kind of bus.
-    model
-        Name of the timing model.
-    """
+    """The most nodes that fit, and that are shown to fit; None under a timing model that does not decide."""
     most = most_nodes(with_nodes, limits_with_time(network, model=model))
     if model != network.bus.deciding_model:
         return most, None
@@ -106,18 +84,10 @@ def most_and_safe_nodes(
 def most_nodes(
     with_nodes: Callable[[Number], Network], limits: Sequence[Held], *, ceiling: int = MAX_COUNT
 ) -> MostNodes:
-    """Find the largest number of nodes that keeps every limit; of several limits that set it, the first is named.
+    """Largest number of nodes that keeps every limit; of several limits that set it, the first is named.
 
-    Each limit is tried by itself, cheap ones first, and only up to what the limits before it allow.
-
-    Parameters
-    ----------
-    with_nodes
-        The network with a number of nodes. Its numbers may be arrays.
-    limits
-        The limits. Their values must not fall as nodes are added.
-    ceiling
-        No answer is larger [1].
+    Each limit is tried by itself, cheap ones first, and only up to what the limits before it allow. No answer is larger
+    than `ceiling` [1]. Values must not fall as nodes are added.
     """
     found = _most_nodes(with_nodes, limits, ceiling=min(ceiling, _PLAUSIBLE))
     if ceiling <= _PLAUSIBLE or is_everywhere(found.nodes < _PLAUSIBLE):
@@ -502,15 +472,7 @@ _CERTAINTY_KEYS: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "s
 
 
 def certainty_numbers(certain: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
-    """Figures that say how certain the verdict is, computed elementwise.
-
-    Parameters
-    ----------
-    certain
-        The certainty of the cycle. Its numbers may be arrays or traced numbers.
-    cycle
-        The cycle under the timing model that decides.
-    """
+    """Figures of the certainty of the verdict, computed elementwise."""
     if not cycle.network.groups:
         return dict.fromkeys(_CERTAINTY_KEYS)
     uncertainty_us = certain.uncertainty_us
@@ -535,15 +497,7 @@ _CYCLE_KEYS: Final = (
 def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
     """Figures that every kind of bus has, computed from a cycle elementwise.
 
-    Parameters
-    ----------
-    cycle
-        The cycle of the network's own number of nodes. Its numbers may be arrays or traced numbers.
-
-    Returns
-    -------
-    dict
-        Keyed as in `CapacityFigures`; infinite where a figure does not exist, such as the period without a cycle.
+    Keys are those of `CapacityFigures`; a figure that does not exist is infinite, such as the period without a cycle.
     """
     if not cycle.network.groups:
         return {"nodes": 0, "axes": 0, **dict.fromkeys(_CYCLE_KEYS, inf)}
@@ -576,14 +530,8 @@ def margin_us(required_us: Number, *, available_us: Number) -> Number:
 def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = False) -> Number:
     """The shortest period that the bus allows and that is long enough for a cycle; infinite where there is none [us].
 
-    Parameters
-    ----------
-    network
-        The network; its own period plays no part. Its numbers may be arrays or traced numbers.
-    needed_us
-        Time that the cycle needs [us].
-    is_shown
-        Whether the period must keep the other limits with their uncertainty; otherwise at nominal values.
+    The network's own period plays no part. With `is_shown` the period keeps the other limits with their uncertainty;
+    otherwise at nominal values.
     """
     bus = network.bus
     period_us = bus.periods.shortest_us(needed_us / network.slice_ratio)
@@ -605,15 +553,7 @@ def words_behind(figures: FitFigures, network: Network) -> tuple[str, ...]:
 
 
 def reset(network: Network, now: FitFigures) -> Network | None:
-    """The network after a bus reset; None where it is not shown to fit now, or where a reset changes nothing.
-
-    Parameters
-    ----------
-    network
-        The network.
-    now
-        Its figures under the model that decides.
-    """
+    """The network after a bus reset; None where it is not shown to fit now, or where a reset changes nothing."""
     changes = network.bus.safety.after_reset
     if now.verdict != FITS or all(value_at(network.profile, key) == value for key, value in changes.items()):
         return None

@@ -31,21 +31,11 @@ _TABLE: Final = "execution.time_us"
 
 
 def given(profile: Profile, key: str) -> Input:
-    """Make an input from a key of a profile.
+    """Input of a derivation from a key of a profile.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    key
-        Dotted key, such as "cycle.period_us".
-
-    Returns
-    -------
-    Input
-        Its grade is the first of these: that of its sourced default, if it has that value; the key beside it, such as
-        bus.master_grade for bus.master_us; the grade of its section; its comment in the file; "given". A grade that the
-        kind of bus sets for the key replaces all but that of a comment.
+    Its grade is the first of these: that of its sourced default, if it has that value; the key beside it, such as
+    bus.master_grade for bus.master_us; the grade of its section; its comment in the file; "given". A grade that the
+    kind of bus sets for the key replaces all but that of a comment.
     """
     *sections, name = key.split(".")
     section: Any = profile
@@ -173,15 +163,7 @@ class HeavyAssumption(NamedTuple):
 
 
 def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssumption, ...]:
-    """The assumptions that carry more than a quarter of the variance or of the required time.
-
-    Parameters
-    ----------
-    figures
-        Figures under the timing model that decides.
-    network
-        The network.
-    """
+    """The assumptions that carry more than a quarter of the variance or of the required time."""
     profile = network.profile
     variance = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     shares: list[_Share] = [

@@ -64,18 +64,7 @@ class Grid(NamedTuple):
         return (dict(zip(self.axes, point, strict=True)) for point in points)
 
     def chunks(self, most: int) -> Iterator[Chunk]:
-        """Split the grid.
-
-        Parameters
-        ----------
-        most
-            Largest number of points of a chunk.
-
-        Yields
-        ------
-        Chunk
-            In row-major order.
-        """
+        """Chunks of the grid in row-major order, of at most `most` points."""
         import numpy as np
 
         # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
@@ -134,10 +123,7 @@ def points_of(network: Network, grid: Grid) -> GridPoints:
 def _nodes_with(axes: object, network: Network, *, nodes_key: str) -> int:
     """Number of varied nodes with which the whole network has so many axes [1].
 
-    Raises
-    ------
-    BusplanError
-        No whole number of nodes has so many axes.
+    BusplanError: no whole number of nodes has so many axes.
     """
     varied = next(nodes for nodes in network.profile.node_groups if nodes.nodes_key == nodes_key)
     node_axes = int(varied.node.axes)

@@ -31,15 +31,7 @@ class Need(NamedTuple):
         return max(self.slice_us / ratio, self.least_us)
 
     def words(self, *, ratio: float, most_us: float) -> str:
-        """Say what is asked, and the longest period there is.
-
-        Parameters
-        ----------
-        ratio
-            Slice ratio [1].
-        most_us
-            The longest period [us].
-        """
+        """Words for the need, at a slice ratio and with the longest period there is [us]."""
         if self.why:
             return self.why
         if self.least_us > self.slice_us / ratio:
@@ -77,14 +69,8 @@ def rooms(network: Network) -> Iterator[Room]:
 def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
     """Needs of a network to be shown to fit, with bias, uncertainty and reserve.
 
-    Time first, and then each limit that asks for a longer period than all before it.
-
-    Parameters
-    ----------
-    network
-        The network; its own period plays no part.
-    is_safe
-        Whether the bus must be set safely, too.
+    Time first, and then each limit that asks for a longer period than all before it. The network's own period plays no
+    part; with `is_safe` the bus must be set safely, too.
     """
     bus = network.bus
     time = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
@@ -169,12 +155,7 @@ def needs_of(network: Network) -> tuple[Need, ...]:
 def unmet(network: Network, needs: Iterable[Need] | None = None) -> list[Need]:
     """Needs that a network does not meet at its own period; empty where every constraint of a plan holds.
 
-    Parameters
-    ----------
-    network
-        The network.
-    needs
-        Its `needs_of`, if they are known.
+    `needs` are those of `needs_of`, if they are known.
     """
     limits = network.bus.limits
     broken = [limit for limit in limits if limit.role == "period" and limit.is_surely_broken(network)]
@@ -207,16 +188,9 @@ _NEXT: Final = 1 + 1e-9
 
 
 def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool = True) -> SmallestPeriod:
-    """Find the smallest period at which a network is shown to fit.
+    """Smallest period at which a network is shown to fit.
 
-    Parameters
-    ----------
-    network
-        The network; its own period plays no part.
-    is_safe
-        Whether the bus must be set safely, too.
-    with_limits
-        Whether [limits] must hold, too.
+    Its own period plays no part. With `is_safe` the bus must be set safely, with `with_limits` [limits] must hold, too.
     """
     bus, ratio = network.bus, float(network.slice_ratio)
 

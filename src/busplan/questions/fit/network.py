@@ -24,10 +24,7 @@ def bus_of(profile: Profile) -> Bus:
 def network_of(profile: Profile) -> Network:
     """Network from which the cycle of a profile is computed.
 
-    Parameters
-    ----------
-    profile
-        The profile. Its values may be numbers, arrays or traced numbers.
+    Values of the profile may be numbers, arrays or traced numbers.
     """
     if profile.constants != changed_constants():
         raise RuntimeError(f"{profile.name}: computed with other constants than its own; see busplan.sourced")
@@ -87,10 +84,7 @@ _COMPARED: Final = (int, float, str, tuple, Traced)
 def trial(network: Network, values: Mapping[str, object]) -> Network:
     """The network with other values by dotted key, unchecked: only for values that are known to be valid.
 
-    Raises
-    ------
-    ValueError
-        The execution time of a payload is not known.
+    ValueError: the execution time of a payload is not known.
     """
     return network_of(with_all_unchecked(network.profile, values))
 
@@ -103,10 +97,7 @@ def at_period(network: Network, period_us: Number) -> Network:
 def with_payloads(network: Network, sizes_bytes: Iterable[tuple[Number, Number]]) -> Network:
     """The network with other payloads for the read and the write of each group of the profile [bytes].
 
-    Raises
-    ------
-    ValueError
-        The execution time of a payload is not known.
+    ValueError: the execution time of a payload is not known.
     """
     values: dict[str, object] = {}
     for group, sizes in zip(network.profile.node_groups, sizes_bytes, strict=True):
@@ -126,10 +117,7 @@ def at_once(group: Group) -> Group:
 def changed(network: Network, changes: Mapping[str, object]) -> Network:
     """The network with other values by dotted key, checked by the profile's schema.
 
-    Raises
-    ------
-    BusplanError
-        The schema refuses them.
+    BusplanError: the schema refuses them.
     """
     return network_of(override(network.profile, dict(changes)))
 
@@ -137,10 +125,7 @@ def changed(network: Network, changes: Mapping[str, object]) -> Network:
 def at_periods(network: Network, periods_us: Sequence[float] | None) -> list[Network]:
     """A network at each of several communication periods [us]; for None, at its own.
 
-    Raises
-    ------
-    BusplanError
-        A period that the profile's schema refuses.
+    BusplanError: the profile's schema refuses a period.
     """
     if periods_us is None:
         return [network]

@@ -273,21 +273,9 @@ def sweep(
 
 
 def computed(sweep: Sweep, *, executor: Executor | None = None, progress: Progress = ignored) -> SweepAnswer:
-    """Compute a sweep.
+    """The answer of a sweep.
 
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    executor, progress
-        As for `sweep`.
-
-    Raises
-    ------
-    BusplanError
-        A point whose circle test cannot be run.
-    Exception
-        Any error that `executor` raises.
+    BusplanError: the circle test of a point cannot be run. Errors that `executor` raises pass through.
     """
     require_executor(executor, circle=sweep.circle)
     table = figure_table(sweep, progress=ignored if sweep.circle else progress)

@@ -43,13 +43,7 @@ _FEWEST_CHUNKS: Final = 64
 
 
 def require_executor(executor: object, *, circle: bool) -> None:
-    """Refuse what is no executor, and any without circle tests.
-
-    Raises
-    ------
-    BusplanError
-        Not a `concurrent.futures.Executor`, or given without circle tests.
-    """
+    """Refuse what is no `concurrent.futures.Executor`, and any without circle tests."""
     if executor is not None and not (circle and isinstance(executor, Executor)):
         wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": needs circle=True"
         raise BusplanError(f"executor{wrong}")
@@ -58,23 +52,9 @@ def require_executor(executor: object, *, circle: bool) -> None:
 def run_points(
     profile: Profile, points: Sequence[Point], *, executor: Executor | None, progress: Progress
 ) -> Iterator[CircleFigures]:
-    """Run the circle tests of some points; a long run is announced first.
+    """Circle tests of some points in their order; a long run is announced first.
 
-    Parameters
-    ----------
-    profile
-        The network.
-    points
-        The points; each has a circle that can be run, or a cycle that does not fit.
-    executor
-        Where tests run; None for this thread.
-    progress
-        Called with the tests that are done, and all of them.
-
-    Yields
-    ------
-    CircleFigures
-        In the order of the points.
+    Each point has a circle that can be run, or a cycle that does not fit. Tests run in this thread without `executor`.
     """
     if not points:
         return
@@ -108,14 +88,9 @@ def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:
 
 
 def chunk_tests(number: int, *, time_s: float) -> int:
-    """Choose the tests of a chunk: about a second of work, and fewer where there would be few chunks.
+    """Number of tests of a chunk: about a second of work, and fewer where there would be few chunks.
 
-    Parameters
-    ----------
-    number
-        All tests.
-    time_s
-        Estimated time of all.
+    `time_s` is the estimated time of all tests.
 
     Examples
     --------
@@ -127,17 +102,10 @@ def chunk_tests(number: int, *, time_s: float) -> int:
 
 
 def circle_results(profile: Profile, grid: Grid, *, executor: Executor | None, progress: Progress) -> Array:
-    """Run the circle tests of a sweep.
+    """Results of the circle tests of a sweep: an array of shape (CIRCLE_COLUMNS, points), float64.
 
-    Returns
-    -------
-    Array
-        Shape (CIRCLE_COLUMNS, points), as float64: truth values are 0 and 1, what is missing is NaN.
-
-    Raises
-    ------
-    BusplanError
-        The first point whose circle test cannot be run, before any is run.
+    Truth values are 0 and 1, what is missing is NaN. BusplanError: the first point whose circle test cannot be run,
+    before any is run.
     """
     for point in grid.each_point():
         causes = refusals(network_of(override(profile, point)))

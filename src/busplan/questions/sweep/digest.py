@@ -44,15 +44,7 @@ def default_columns(sweep: Sweep) -> tuple[str, ...]:
 
 
 def sentences(sweep: Sweep, table: Columns) -> Iterator[blocks.Sentence]:
-    """How many points there are, and how many fit.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    table
-        All its columns.
-    """
+    """Sentences on the number of points, and of those that fit."""
     points = sweep.grid.points
     head = blocks.sentence(
         f"{{}}: {{}} {nouns(points, 'point')}; ", blocks.Code(sweep.profile.name), _points(points, "points")
@@ -114,16 +106,9 @@ def _unjudged(points: int) -> Iterator[blocks.Sentence]:
 
 
 def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[blocks.Sentence, blocks.Table]:
-    """The first rows, after how many there are; headings are the names of the columns.
+    """Table of the first rows, after their number; headings are the names of the columns.
 
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    table
-        All its columns.
-    most
-        Most rows; None for every row.
+    At most `most` rows; None for all.
     """
     columns = (*sweep.grid.axes, TIMING_MODEL.key, *default_columns(sweep))
     total = table[TIMING_MODEL.key].size
@@ -143,15 +128,7 @@ def first_rows(sweep: Sweep, table: Columns, *, most: int | None) -> tuple[block
 
 
 def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[blocks.Sentence]:
-    """Say that the payload does not follow the axes of a node, where these vary.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    varied
-        Keys that vary.
-    """
+    """Sentence that the payload does not follow the axes of a node, where these vary."""
     for nodes in profile.node_groups:
         if nodes.node_key("axes") not in varied or nodes.payload.follows_axes:
             continue

@@ -39,17 +39,7 @@ def sweep_facts(sweep: Sweep) -> JsonDocument:
 
 
 def written_rows(form: RowsForm, sweep: Sweep, table: Columns) -> Iterator[bytes]:
-    """Write a table piece by piece.
-
-    Parameters
-    ----------
-    form
-        The form; "parquet" needs pyarrow.
-    sweep
-        The sweep that gives the rows.
-    table
-        Its columns, or some of them.
-    """
+    """A table as text or bytes, piece by piece; "parquet" needs pyarrow."""
     if form == "parquet":
         yield _parquet(sweep, table)
         return
@@ -116,13 +106,6 @@ def arrow_table(sweep: Sweep, table: Columns) -> "pa.Table":
 
     Each field has its unit and meaning as metadata. The metadata of the table are `busplan.version`, `busplan.profile`
     (TOML) and `busplan.sweep` (the JSON document without its rows).
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    table
-        Its columns, or some of them.
     """
     import pyarrow as pa
 

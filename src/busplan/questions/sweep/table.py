@@ -78,25 +78,9 @@ def checked_sweep(
     unlimited: bool,
     changes: KeyChanges = NO_CHANGES,
 ) -> Sweep:
-    """Check the options of a sweep.
+    """A sweep whose options are checked.
 
-    Parameters
-    ----------
-    network
-        The network, with its changes.
-    vary
-        Values by dotted key, as `sweep` takes them.
-    timing_models
-        Names of timing models; by default all that can express every value.
-    circle, unlimited
-        Run circle tests, and run any number of them.
-    changes
-        The changes of the profile, for the answer to name them.
-
-    Raises
-    ------
-    BusplanError
-        As `axis_values`, `checked_grid`, `grid_models` and `require_few`.
+    BusplanError: as `axis_values`, `checked_grid`, `grid_models` and `require_few`.
     """
     profile, bus = network.profile, network.bus
     axes = {key: axis_values(profile, key, given, name="vary") for key, given in vary.items()}
@@ -126,14 +110,7 @@ def column_figures(sweep: Sweep) -> dict[str, Figure]:
 
 
 def figure_table(sweep: Sweep, *, progress: Progress = ignored) -> Columns:
-    """Compute all figures of `capacity` over the grid of a sweep.
-
-    Parameters
-    ----------
-    sweep
-        The sweep.
-    progress
-        Called with the points that are done, and all of them.
+    """All figures of `capacity` over the grid of a sweep.
 
     References
     ----------

@@ -29,22 +29,10 @@ MOST_POINTS: Final = 1_000_000
 
 
 def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bool) -> Grid:
-    """Make a grid after validating its values.
+    """A grid whose values are valid.
 
-    Parameters
-    ----------
-    profile
-        The network.
-    axes
-        Values by dotted key.
-    with_circle
-        If False, keys that only the circle test reads are refused.
-
-    Raises
-    ------
-    BusplanError
-        A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses; too
-        many points.
+    Without `with_circle`, keys that only the circle test reads are refused. BusplanError: a key that is unknown, not a
+    number, or without effect here; a value that the schema refuses; too many points.
     """
     require_keys(profile, axes, option="vary", circle_option=None if with_circle else "circle")
     samples = {key: _samples(axis) for key, axis in axes.items()}
@@ -66,21 +54,8 @@ def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bo
 def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_option: str | None) -> None:
     """Refuse keys that cannot vary, whatever their values.
 
-    Parameters
-    ----------
-    profile
-        The network.
-    keys
-        Dotted keys.
-    option
-        Option that gives them, for messages.
-    circle_option
-        Option that requests circle tests, for messages; None where they are run.
-
-    Raises
-    ------
-    BusplanError
-        A key that is unknown, not a number, or without effect here.
+    `option` and `circle_option` name options in messages; `circle_option` is None where circle tests are run.
+    BusplanError: a key that is unknown, not a number, or without effect here.
     """
     read = cycle_keys(profile)
     for key in keys:
@@ -99,19 +74,7 @@ def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_o
 def grid_models(network: Network, grid: Grid, models: Sequence[str] | None) -> tuple[str, ...]:
     """Timing models of a sweep: those that can express every value of the grid.
 
-    Parameters
-    ----------
-    network
-        The network.
-    grid
-        Values of its keys.
-    models
-        Names of timing models; by default all that can.
-
-    Raises
-    ------
-    BusplanError
-        One of `models` cannot express a value.
+    BusplanError: one of `models` cannot express a value.
     """
     variants = [changed(network, {key: value}) for key, axis in grid.axes.items() for value in _samples(axis)]
     if models is not None:
@@ -170,21 +133,8 @@ _MOST_LISTED: Final = 10_000
 def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Array:
     """Values of a key as an array: from text as on the command line, a range, or several values.
 
-    Parameters
-    ----------
-    profile
-        The network.
-    key
-        Dotted key.
-    given
-        The values.
-    name
-        Name of the argument in messages.
-
-    Raises
-    ------
-    BusplanError
-        Not a number or a word of the key, a repeated value, or a range that never reaches its end.
+    `name` is that of the argument in messages. BusplanError: not a number or a word of the key, a repeated value, or a
+    range that never reaches its end.
 
     Examples
     --------
