@@ -50,10 +50,7 @@ _KINDS: Final = {
 def require_regular(path: Path, *, or_written_pipe: bool = False) -> None:
     """Refuse a file that may have no end or is read more than once, as a device; a pipe with a writer may be allowed.
 
-    Raises
-    ------
-    BusplanError
-        It is no such file, does not exist or cannot be looked at.
+    BusplanError: it is no such file, does not exist or cannot be looked at.
     """
     try:
         mode = path.stat().st_mode

@@ -265,10 +265,7 @@ def _period_changes(text: str) -> list[KeyChange]:
 def load_each(arguments: Sequence[str], load: "Callable[[str], Profile]") -> "list[Profile]":
     """Read every profile.
 
-    Raises
-    ------
-    BusplanError
-        Standard input more than once; or the problems of all profiles together.
+    BusplanError: standard input more than once; or the problems of all profiles together.
     """
     profiles: list[Profile] = []
     problems: list[str] = []

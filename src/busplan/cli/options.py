@@ -61,10 +61,7 @@ ALL_MODELS: Final = "both"
 def time_us(text: str, *, option: str) -> float:
     """Parse a time with its unit, such as 4ms, 250us or 0.001s [us].
 
-    Raises
-    ------
-    BusplanError
-        Not a number with a unit, or too large for a float.
+    BusplanError: not a number with a unit, or too large for a float.
     """
     match = _TIME.fullmatch(text.strip())
     if match is None:
@@ -78,10 +75,7 @@ def time_us(text: str, *, option: str) -> float:
 def parse_sizes(text: str, *, option: str) -> list[int]:
     """Parse sizes separated by commas, such as 4,16,32 [bytes].
 
-    Raises
-    ------
-    BusplanError
-        Not whole numbers above zero.
+    BusplanError: not whole numbers above zero.
     """
     sizes = []
     for part in text.split(","):
@@ -157,10 +151,7 @@ def form_of_file(
 ) -> AnyForm:
     """Choose the form of a document: by --format, else by the ending of --output, else the default.
 
-    Raises
-    ------
-    BusplanError
-        The ending is not known.
+    BusplanError: the ending is not known.
     """
     ending = "" if output is None else output.suffix.lower()
     chosen = given or (default if output is None else forms.get(ending))
@@ -205,10 +196,7 @@ VALUES_HELP: Final = (
 def parse_axes(texts: list[str]) -> dict[str, str]:
     """Parse all --vary options, in order: the text of the values by key.
 
-    Raises
-    ------
-    BusplanError
-        No option, a repeated key, or not KEY=VALUES.
+    BusplanError: no option, a repeated key, or not KEY=VALUES.
     """
     if not texts:
         raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")

@@ -217,10 +217,7 @@ def terminal_size() -> tuple[int, int] | None:
 def emit_text(text: str) -> None:
     """Write text for people to stdout, in the encoding of the terminal; characters that it lacks are escaped.
 
-    Raises
-    ------
-    BusplanError
-        stdout is closed or cannot be written.
+    BusplanError: stdout is closed or cannot be written.
     """
     sys.stdout.write(text)
     sys.stdout.flush()
@@ -229,10 +226,7 @@ def emit_text(text: str) -> None:
 def emit_pages(text: str) -> None:
     """Write text that is read from its top: by the user's pager where the terminal is too low for it, as git does.
 
-    Raises
-    ------
-    BusplanError
-        As `emit_text`.
+    BusplanError: as `emit_text`.
     """
     is_read = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     if is_read and os.environ.get(PAGER, "less") not in ("", "cat"):
@@ -249,10 +243,7 @@ def emit_pages(text: str) -> None:
 def emit_document(document: str | bytes) -> None:
     """Write a document for programs to stdout; text is UTF-8, whatever the terminal's encoding.
 
-    Raises
-    ------
-    BusplanError
-        As `emit_text`.
+    BusplanError: as `emit_text`.
     """
     sys.stdout.flush()
     sys.stdout.buffer.write(document_bytes(document))
@@ -262,10 +253,7 @@ def emit_document(document: str | bytes) -> None:
 def refuse_terminal(form: str) -> None:
     """Refuse to write binary data to a terminal.
 
-    Raises
-    ------
-    BusplanError
-        stdout is a terminal.
+    BusplanError: stdout is a terminal.
     """
     if sys.stdout.isatty():
         raise BusplanError(f"--format {form}: is not for a terminal; give -o FILE.{form}, or use a pipe")

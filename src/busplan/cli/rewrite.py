@@ -30,12 +30,7 @@ def changing(path: Path) -> Iterator[None]:
     """Lock a file against other runs between reading and writing it.
 
     The folder is locked, because the file is replaced or may not exist yet. The lock ends with the process at the
-    latest.
-
-    Raises
-    ------
-    BusplanError
-        There is no such folder, or another run holds the lock too long.
+    latest. BusplanError: there is no such folder, or another run holds the lock too long.
     """
     if os.name == "nt":  # Windows locks no folder
         yield
@@ -98,10 +93,7 @@ def require_changeable(path: Path) -> os.stat_result | None:
 def rewrite(path: Path, content: bytes) -> None:
     """Replace the content of a file atomically; it keeps owner and mode.
 
-    Raises
-    ------
-    BusplanError
-        It cannot be changed (see `require_changeable`) or written, or its owner cannot be kept.
+    BusplanError: it cannot be changed (see `require_changeable`) or written, or its owner cannot be kept.
     """
     status = require_changeable(path)
     with new_file(path, overwrite=True) as file:
@@ -126,10 +118,7 @@ def _keep_owner(file: NewFile, status: os.stat_result, path: Path) -> None:
 def require_own_file(argument: str) -> None:
     """Refuse a PROFILE argument that is not a file of the user, or a file that cannot be changed.
 
-    Raises
-    ------
-    BusplanError
-        Standard input, a shipped profile, or a file that is read-only or has hard links.
+    BusplanError: standard input, a shipped profile, or a file that is read-only or has hard links.
     """
     from busplan.profile.sources import shipped_names
 

@@ -46,15 +46,10 @@ class NextBottleneck(NamedTuple):
 
 
 def next_bottleneck(network: Network) -> NextBottleneck:
-    """Find what binds a network once its first bottleneck is gone.
+    """The largest term of a network once its first bottleneck is gone.
 
     A term is taken out at its cause, and the cycle is computed anew: without execution, for example, the bus is idle
     for longer.
-
-    Parameters
-    ----------
-    network
-        The network.
     """
     bus = network.bus
     cycle = bus.cycle(network, model=bus.deciding_model)
@@ -237,13 +232,7 @@ _FARTHEST: Final = 1e6
 
 
 def reaches(network: Network) -> Iterator[Reach]:
-    """How far execution times, nodes and each number of the bus may grow, one at a time.
-
-    Parameters
-    ----------
-    network
-        A network that is shown to fit.
-    """
+    """Room of a network that is shown to fit: for execution times, nodes and each number of the bus, one at a time."""
     bus = network.bus
     if any(group.read_execution_us or group.write_execution_us for group in network.groups):
         yield _reach("execution times, factor", "execution", 1.0, partial(slower, network))
@@ -308,13 +297,7 @@ class Sensitivity(NamedTuple):
 
 
 def sensitivity_of(network: Network) -> Sensitivity:
-    """Make every small change of a network, and compute its cycle anew.
-
-    Parameters
-    ----------
-    network
-        The network.
-    """
+    """Every small change of a network, with its cycle computed anew."""
     now = figures(network, model=network.bus.deciding_model)
     effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))

@@ -125,16 +125,9 @@ class _Trials(NamedTuple):
 def verdicts_of(
     points: Sequence[GridPoint], results: Sequence[tuple[CapacityFigures, ...]], *, progress: Progress = ignored
 ) -> list[Verdict]:
-    """Judge networks at their periods; those that differ in their period alone share what it has no part in.
+    """Verdicts on networks at their periods; those that differ in their period alone share what it has no part in.
 
-    Parameters
-    ----------
-    points
-        The networks.
-    results
-        Figures of each under the timing models that were asked for.
-    progress
-        Called now and then with the networks that are judged, and all of them.
+    `results` has the figures of each under the timing models that were asked for.
     """
     variants: dict[object, Variants] = {}
     trials = []

@@ -259,10 +259,7 @@ def map_(
 def possible_points(network: Network, x: Direction, y: Direction | None) -> GridPoints:
     """The points of two directions, column by column.
 
-    Raises
-    ------
-    BusplanError
-        A profile can have none of them.
+    BusplanError: a profile can have none of them.
     """
     along = (x,) if y is None else (x, y)
     points = points_of(network, Grid({one.key: np.array(one.values, dtype=object) for one in along}))
@@ -305,10 +302,7 @@ def in_rows(items: Sequence[_Item], *, columns: int) -> tuple[tuple[_Item, ...],
 def directions(network: Network, x: Along | None, y: Along | None, *, with_circle: bool) -> tuple[Direction, Direction]:
     """The directions along x and y; by default the axes of all nodes, and the period.
 
-    Raises
-    ------
-    BusplanError
-        A direction is not one key and its values, or both vary the same key.
+    BusplanError: a direction is not one key and its values, or both vary the same key.
     """
     profile = network.profile
     # Messages alone have no nodes whose number could vary.

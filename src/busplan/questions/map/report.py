@@ -126,14 +126,9 @@ def _looks(answer: MapAnswer) -> _Looks:
 
 
 def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> charts.Drawing:
-    """Draw the verdict and its limit at each setting.
+    """Picture of the verdict and its limit at each setting.
 
-    Parameters
-    ----------
-    answer
-        The map.
-    frame
-        Row and column of the setting to mark; by default those of this design.
+    `frame` is row and column of the setting to mark; by default those of this design.
     """
     looks, legend = _looks(answer), []
     for (state, limits), look in looks.items():

@@ -45,15 +45,7 @@ from busplan.sourced import constants_changed
 
 
 def page_report(profiles: "Sequence[ReportedProfile]", *, title: str | None = None) -> Report:
-    """Make the page: a chapter for each profile, after a comparison if there are several.
-
-    Parameters
-    ----------
-    profiles
-        One or more.
-    title
-        Title of the page; by default the profile's name, or the number of profiles.
-    """
+    """The page: a chapter for each profile, after a comparison if there are several."""
     usual = Code(profiles[0].profile.name) if len(profiles) == 1 else plural(len(profiles), "profile")
     return Report(
         Sentence((usual if title is None else title,)),

@@ -166,23 +166,11 @@ class Total(NamedTuple):
 
 
 def schedule(network: Network, *, model: str | None = None, number: int | None = None) -> Schedule:
-    """Lay out one communication cycle, node by node.
+    """One communication cycle, node by node.
 
-    First come the events of the bus, then the idle rest of the slice. No event has zero duration.
-
-    Parameters
-    ----------
-    network
-        The network.
-    model
-        Timing model; without it the one that decides.
-    number
-        Number of the cycle, from 1; by default the cycle that the verdict is for.
-
-    Raises
-    ------
-    BusplanError
-        More nodes or events than can be laid out one by one.
+    First come the events of the bus, then the idle rest of the slice. No event has zero duration. `number` is that of
+    the cycle, from 1; by default the cycle that the verdict is for. BusplanError: more nodes or events than can be laid
+    out one by one.
 
     References
     ----------
@@ -269,21 +257,10 @@ def zoom(
     to_us: float | None = None,
     transaction: tuple[str, int] | None = None,
 ) -> Schedule:
-    """Narrow the window of a schedule to what all given bounds have in common.
+    """A schedule whose window is what all given bounds have in common.
 
-    Parameters
-    ----------
-    laid_out
-        The schedule.
-    from_us, to_us
-        Start and end of the window, from the start of the cycle [us]; by default the schedule's own.
-    transaction
-        One transaction with its gaps: ("read", 1).
-
-    Raises
-    ------
-    BusplanError
-        The window is empty.
+    `from_us` and `to_us` count from the start of the cycle [us]; `transaction` is one with its gaps: ("read", 1).
+    BusplanError: the window is empty.
     """
     start_us = max(laid_out.from_us, laid_out.from_us if from_us is None else from_us)
     end_us = min(laid_out.to_us, laid_out.to_us if to_us is None else to_us)
