@@ -177,7 +177,7 @@ class TracedConstant(Traced):
 
     @property
     def meaning(self) -> str:
-        """What the constant is, in one line."""
+        """Meaning of the constant, in one line."""
         return self.constant.meaning
 
 

@@ -1,4 +1,4 @@
-"""What commands share: PROFILE, --period, --set, --all, --format, --output and --no-pager, declared and handled once.
+"""Options and arguments that commands share: PROFILE, --period, --set, --all, --format, --output and --no-pager, declared and handled once.
 
 A command is a function that takes a `Call` and returns its answer; `command` makes it what typer calls.
 """
@@ -68,7 +68,7 @@ _SET_HELP: Final = (
 
 @dataclass(frozen=True)
 class Call:
-    """What all questions are asked with."""
+    """The arguments and options of a command that all questions share."""
 
     argument: str = ""
     """PROFILE; empty for a command that has none, or names its profiles itself."""

@@ -441,7 +441,7 @@ def _axes(**texts: str | None) -> dict[str, dict[str, str] | None]:
 
 @contextmanager
 def _crew(jobs: int | None, *, circle: bool) -> "Iterator[Executor | None]":
-    """Where circle tests run; None for this process."""
+    """Executor of circle tests; None for this process."""
     require_company("--circle", {"--jobs": jobs}, is_given=circle)
     from busplan.cli.workers import available_processors, executor
 

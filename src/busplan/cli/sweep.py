@@ -74,7 +74,7 @@ class _Circle:
             )
 
     def crew(self, *, points: int) -> "AbstractContextManager[Executor | None]":
-        """Where the tests run: in worker processes or on a cluster; None for this process."""
+        """Executor of the tests: worker processes or a cluster; None for this process."""
         if not self.circle:
             return nullcontext()
         from busplan.cli.workers import available_processors, dask_executor, executor

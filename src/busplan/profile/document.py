@@ -171,7 +171,7 @@ class Document:
 
 
 def number_meant(written: str) -> str:
-    """What a number with a decimal comma or a percent sign is in TOML, after a semicolon; empty for other text."""
+    """Advice for a number with a decimal comma or a percent sign, after a semicolon; empty for other text."""
     match = re.fullmatch(r"(-?[0-9]{1,20})(?:[.,]([0-9]{1,20}))?\s*(%?)", written)
     if match is None or not (match[3] or "," in written):
         return ""

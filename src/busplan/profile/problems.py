@@ -187,7 +187,7 @@ def _expected(details: ErrorDetails) -> str:
 
 
 def _as_share(value: Any, most: float) -> str:
-    """What a percentage is as a share, if one was given for it; else nothing."""
+    """Advice on the share that a percentage means; empty for other values."""
     if most > 1 or not isinstance(value, int | float) or not _LEAST_PERCENT <= value <= _PERCENT * most:
         return ""
     return f"; it is a share: {value / _PERCENT:g} for {value:g} %"

@@ -27,7 +27,7 @@ _LOSS_STREAM = {"x": 1, "y": 2}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arrivals:
-    """When and whether the packets of each cycle reach a node."""
+    """Arrivals of the packets of each cycle at a node, and whether they arrive."""
 
     offsets_us: Floats
     """Delay of the SP of each cycle [us]."""

@@ -1,4 +1,4 @@
-"""What every CAN network has, its loads and response times; and a network of messages alone."""
+"""Loads and response times, which every CAN network has; and a network of messages alone."""
 
 from abc import abstractmethod
 from bisect import bisect_left
@@ -42,7 +42,7 @@ _OF_CYCLE: Final = OF_SYNC | {"bus.host_us", "bus.pipeline_cycles"}
 
 
 class CanCycle(BusCycle):
-    """What every CAN network has, with and without a cycle: loads, and response times of messages."""
+    """Loads, and response times of messages: of every CAN network, with a cycle or without."""
 
     term_figures = TERMS
     record: ClassVar[type[CanMessageFigures]] = CanMessageFigures

@@ -152,7 +152,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return can_cycle(network, model)
 
     def latency_subject(self, network: Network) -> str:
-        """Whose response time it is, in words."""
+        """Subject of a response time, in words."""
         if not network.groups:
             return ", ".join(("worst case of every message", *self.setup_words(network)))
         nodes = "all nodes" if network.is_uniform else "each group"

@@ -115,7 +115,7 @@ def _state(row: Figure, values: Mapping[str, Any]) -> blocks.State:
 
 
 def _rests_on_table(verdict: Verdict) -> blocks.Table:
-    """What the profile does not give and the verdict takes for granted."""
+    """Table of what the profile does not give and the verdict takes for granted."""
     rows = (blocks.TableRow((part.words, blocks.Code(part.key) if part.key else "none")) for part in verdict.rests_on)
     columns = blocks.TableColumn("premise", kind="words"), blocks.TableColumn("key", kind="words")
     return blocks.Table(
@@ -124,7 +124,7 @@ def _rests_on_table(verdict: Verdict) -> blocks.Table:
 
 
 def _groups_table(answer: CapacityAnswer) -> blocks.Table:
-    """How many nodes of each group fit each period, the other groups as they are."""
+    """Table of the nodes of each group that fit each period, the other groups as they are."""
     columns = [blocks.TableColumn("group", kind="words"), blocks.TableColumn("nodes"), blocks.TableColumn("axes")]
     shown = [
         (figures, _GROUP_BY_OTHER if figures.verdict is None else _GROUP_BY_DECIDING) for figures in answer.results

@@ -211,7 +211,7 @@ class Effect(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """How far one quantity may grow alone, until the plan is no longer shown to fit or the bus is unsafe."""
+    """Growth of one quantity alone, until the plan is no longer shown to fit or the bus is unsafe."""
 
     quantity: str
     key: str
@@ -274,7 +274,7 @@ def _reach(quantity: str, key: str, now: float, network_at: Callable[[float], Ne
 
 
 def _broken_at(network_at: Callable[[float], Network], value: float, *, whole: bool) -> tuple[str, ...] | None:
-    """What breaks at a value; empty if nothing does, None if a profile cannot have it."""
+    """Limits that break at a value; empty if nothing does, None if a profile cannot have it."""
     try:
         network = network_at(int(value) if whole else value)
     except BusplanError:

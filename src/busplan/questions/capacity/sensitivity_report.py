@@ -61,7 +61,7 @@ def _record(effect: Effect, safety: Safety) -> blocks.Record:
 
 
 def _bottleneck_record(bottleneck: NextBottleneck, register: BusFigures) -> blocks.Record:
-    """What binds now and next, as data and as a sentence; with groups, their limits are a list."""
+    """The bottleneck now and next, as data and as a sentence; with groups, their limits are a list."""
     limits = [
         {
             "safe_limited_by": limit.limited_by,
@@ -136,7 +136,7 @@ def _table(sensitivity: Sensitivity) -> blocks.Table:
 
 
 def _change_value(effect: Effect, sensitivity: Sensitivity) -> blocks.ShownValue:
-    """What a change takes from the margin, in the digits that the margin has."""
+    """Change of the margin, in the digits that the margin has."""
     change_us, now = effect.margin_change_us, sensitivity.now
     decimals = min(_DECIMALS, max(0, known_decimals(change_us or 0.0, now.uncertainty_us)))
     return blocks.ShownValue(change_us, "margin_change_us", "us", decimals, signed=True)
@@ -152,7 +152,7 @@ def _then_value(effect: Effect) -> blocks.ShownValue:
 
 
 def _reaches_table(reaches: Sequence[Reach]) -> blocks.Table:
-    """How far each quantity may grow."""
+    """Table of the growth that each quantity allows."""
     columns = (
         blocks.TableColumn("quantity", kind="words"),
         blocks.TableColumn("now"),

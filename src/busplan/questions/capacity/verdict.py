@@ -109,7 +109,7 @@ class Verdict:
 
 
 class _Trials(NamedTuple):
-    """What is known of a network before the figures of what it could become."""
+    """Facts on a network that are known before the figures of what it could become."""
 
     deciding: CapacityFigures
     variants: Variants
@@ -351,7 +351,7 @@ def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
 
 
 def _more(count: GroupCapacity, number: int) -> str:
-    """How many more nodes of a group, or of all, are shown to fit, and their axes."""
+    """More nodes of a group, or of all, that are shown to fit, and their axes."""
     if count.name:
         axes = (count.safe_axes or 0) - count.axes
         return f"{number:,} more {nouns(number, 'node')} of {count.name}" + (
@@ -364,7 +364,7 @@ def _more(count: GroupCapacity, number: int) -> str:
 
 
 def _beside_limit(verdict: Verdict, why: str) -> str | None:
-    """What a reason says beside the words of a limit that stand on the card already; None where it has other words."""
+    """Part of a reason beside the words of a limit that stand on the card already; None where it has other words."""
     for words in verdict.broken_limits:
         if why.startswith(words):
             return why.removeprefix(words).strip(" ()")
@@ -372,7 +372,7 @@ def _beside_limit(verdict: Verdict, why: str) -> str | None:
 
 
 def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
-    """What a verdict rests on in words: all, or the first that a line of some characters holds and how many more."""
+    """Premises of a verdict in words: all, or the first that a line of some characters holds and how many more."""
     words = [*dict.fromkeys(part.words for part in rests_on)]
     if most is None or len(", ".join(words)) <= most:
         return ", ".join(words)
@@ -384,7 +384,7 @@ def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
 
 
 def _buses(verdict: Verdict, bus: Bus) -> Iterator[_Line]:
-    """How many such buses would carry all nodes, where one is not shown to."""
+    """Number of such buses that would carry all nodes, where one is not shown to."""
     figures = verdict.deciding
     most = figures.safe_nodes or 0
     if 0 < most < figures.nodes:
@@ -422,7 +422,7 @@ def _basis(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line
 
 
 def _assumed_words(assumptions: Sequence[HeavyAssumption]) -> str:
-    """What carries the verdict and is assumed, and how to find it."""
+    """Assumptions that carry the verdict, and how to find their values."""
     rates = [key for assumption in assumptions for key in assumption.keys if assumption.is_bit_rate]
     others = [key for assumption in assumptions for key in assumption.keys if key not in rates]
     them = "it" if len(others) == 1 else "them"
@@ -434,7 +434,7 @@ def _assumed_words(assumptions: Sequence[HeavyAssumption]) -> str:
 
 
 def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
-    """What the answer needs only when somebody asks: the correction, the published figures, other models."""
+    """Lines that the answer needs only when somebody asks: the correction, the published figures, other models."""
     figures = verdict.deciding
     if figures.bias_us:
         words = "included in used: measured buses take this much longer than the timing model"
@@ -448,7 +448,7 @@ def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Li
 
 
 def _caveats(verdict: Verdict) -> Iterator[_Line]:
-    """What speaks against the verdict at its period: another model, a bus reset, a warning."""
+    """Reasons against the verdict at its period: another model, a bus reset, a warning."""
     deciding = verdict.deciding
     for other in verdict.others:
         if contradicts(other.fits, deciding):

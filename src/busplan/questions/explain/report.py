@@ -81,7 +81,7 @@ def assumptions_report(answer: ExplainAnswer) -> blocks.Report:
 
 
 def _example(name: str, figures: Iterable[str]) -> blocks.Sentence:
-    """How to ask for a figure: the required time, or the first where a profile has no cycle."""
+    """A question for a figure as an example: the required time, or the first where a profile has no cycle."""
     figure = "required_us" if "required_us" in figures else next(iter(figures), "FIGURE")
     return blocks.Sentence((blocks.Code(f"busplan explain {name} {figure}"), " explains a figure."))
 

@@ -77,7 +77,7 @@ def jitter_us(network: Network) -> float:
 
 
 def _command_effects_us(cycle: BusCycle) -> tuple[float, float]:
-    """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
+    """Effect of the commands of the first and the last node with axes, from the start of the cycle [us]."""
     network = cycle.network
     ends = list(accumulate(int(group.nodes) for group in network.groups))
     with_axes = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
@@ -209,7 +209,7 @@ def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> R
 
 
 def delivery_of(network: Network) -> Delivery:
-    """How set-points arrive, with the skew and the jitter that the bus adds."""
+    """Delivery of set-points, with the skew and the jitter that the bus adds."""
     delivery = network.profile.delivery
     late = {"skew_us": delivery.skew_us + skew_us(network), "jitter_us": jitter_us(network)}
     return Delivery(

@@ -1,4 +1,4 @@
-"""What may be changed in a network, and the changes with which it holds every constraint of a plan."""
+"""Changes that a network may have, and those with which it holds every constraint of a plan."""
 
 from bisect import bisect_left
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -57,7 +57,7 @@ _WORTHWHILE: Final = 0.99
 
 
 class Variants:
-    """What a network needs, as it is and after changes: found once for networks that differ in their period alone."""
+    """Needs of a network, as it is and after changes: found once for networks that differ in their period alone."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
@@ -281,7 +281,7 @@ def _with(start: AtPeriod, changes: Sequence[Changes]) -> AtPeriod:
 
 
 def _lack(needs: Sequence[Need], network: Network) -> tuple[int, float]:
-    """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
+    """Distance of a network from all constraints: those that no period mends, and the period for the rest [us]."""
     periods_us = [need.period_us(float(network.slice_ratio)) for need in needs]
     return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
 
@@ -413,7 +413,7 @@ def stands_in_the_way(network: Network, step: PlanStep) -> Need:
 
 
 def changeable(network: Network) -> tuple[str, ...]:
-    """What a plan may change unasked, in words, the cheapest first."""
+    """Settings that a plan may change unasked, in words, the cheapest first."""
     return tuple(freedom.label for freedom in freed(network))
 
 

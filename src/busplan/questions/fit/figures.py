@@ -154,7 +154,7 @@ COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes
 
 @dataclass(frozen=True)
 class GroupCapacity:
-    """How many nodes of one group a bus carries, the other groups as they are."""
+    """Nodes of one group that a bus carries, the other groups as they are."""
 
     name: str
     """Empty where all nodes are alike."""
@@ -298,7 +298,7 @@ def with_counts(fit: FitFigures, counts: tuple[GroupCapacity, ...]) -> CapacityF
 
 
 def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
-    """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
+    """Nodes of each group that fit a network's period, and are shown to fit; of all where they are alike."""
     groups = network.profile.node_groups
     if len(groups) < _MANY_GROUPS or not has_arrays(network):
         found = (most_and_safe_nodes(network.varying(group.name).with_nodes, network, model=model) for group in groups)

@@ -55,7 +55,7 @@ class Grid(NamedTuple):
 
     @property
     def points(self) -> int:
-        """How many points."""
+        """Number of points."""
         return prod(self.shape)
 
     def each_point(self) -> Iterator[dict[str, object]]:
@@ -89,7 +89,7 @@ class GridPoint(NamedTuple):
     """The network with them."""
 
     def without(self, key: str) -> _Changes:
-        """Its changes but for one key: points that share them share what does not depend on the key."""
+        """Changes of the point but for one key: points that share them share what does not depend on the key."""
         return tuple(change for change in self.changes.items() if change[0] != key)
 
 

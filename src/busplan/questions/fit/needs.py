@@ -1,4 +1,4 @@
-"""What a network needs of its period, which of [limits] it misses, and the smallest period at which all holds."""
+"""Needs of a network, the [limits] that it misses, and the smallest period at which all holds."""
 
 from collections.abc import Iterable, Iterator
 from math import ceil, inf

@@ -294,7 +294,7 @@ def map_of(
 
 
 def in_rows(items: Sequence[_Item], *, columns: int) -> tuple[tuple[_Item, ...], ...]:
-    """What stands column by column, row by row."""
+    """Items that stand column by column, row by row."""
     height = len(items) // columns
     return tuple(tuple(items[row::height]) for row in range(height))
 

@@ -25,7 +25,7 @@ _DIGITS: Final = 6
 
 
 class Look(NamedTuple):
-    """How a state is drawn."""
+    """Mark and colour of a state."""
 
     mark: str
     """Its character. Where a limit of the bus is broken, the letter of that limit replaces it."""
@@ -61,7 +61,7 @@ def map_report(answer: MapAnswer) -> blocks.Report:
 
 
 def _blocks(answer: MapAnswer) -> Iterator[blocks.Block]:
-    """How much fits and whether this design does, the picture, and what limits each region."""
+    """The number of settings that fit, the verdict on this design, the picture, and the limit of each region."""
     headline, looks = _headline(answer), _looks(answer)
     yield headline
     yield from _remarks(answer)
@@ -79,7 +79,7 @@ def _blocks(answer: MapAnswer) -> Iterator[blocks.Block]:
 
 
 def _headline(answer: MapAnswer) -> blocks.Sentence:
-    """How many settings fit, and whether this design does."""
+    """The number of settings that fit, and the verdict on this design."""
     fitting, drawn = _counts(answer)
     circle = " with a circle that passes" if answer.with_circle else ""
     words = f"{{}}: {{}} of {{}} {nouns(len(answer.cells), 'setting')} are shown to fit{circle}."
@@ -98,7 +98,7 @@ def _counts(answer: MapAnswer) -> tuple[blocks.ShownValue, blocks.ShownValue]:
 
 
 def _remarks(answer: MapAnswer) -> Iterator[blocks.Sentence]:
-    """What is not drawn or not judged, and why."""
+    """Settings that are not drawn or not judged, and why."""
     missing = answer.not_drawn
     if missing:
         number = blocks.count_value(len(missing))

@@ -186,7 +186,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         return b"".join(self.rows_in(form))
 
     def sentences(self) -> tuple[Sentence, ...]:
-        """How many points there are, how many fit, and what is wrong at others."""
+        """Sentences on the number of points, on those that fit, and on what is wrong at others."""
         return tuple(sentences(self.sweep, self.table))
 
     def report(self, *, most: int | None = _SHOWN) -> Report:

@@ -40,7 +40,7 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 
 
 class Sweep(NamedTuple):
-    """What a sweep computes: a row for each point of a grid and each timing model."""
+    """A sweep to compute: a row for each point of a grid and each timing model."""
 
     profile: Profile
     """The network, with its changes."""
@@ -204,7 +204,7 @@ def _number(number: Number | None, sort: Sort) -> Array:
 
 
 def _counts(network: Network, *, model: str, group: str) -> dict[str, Array]:
-    """How many nodes fit: of each group, and of the whole where one group varies and the others are as they are."""
+    """Nodes that fit: of each group, and of the whole where one group varies and the others are as they are."""
     if not network.groups:
         return {
             **dict.fromkeys(COUNTS, _NO_NUMBER),

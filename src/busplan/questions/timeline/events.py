@@ -67,7 +67,7 @@ class ModelNeeds(NamedTuple):
 
     @property
     def free_us(self) -> float:
-        """What it leaves of the slice, as far as its model knows [us]."""
+        """Unused time of the slice, as far as its model knows [us]."""
         return self.margin_us if self.margin_corrected_us is None else self.margin_corrected_us
 
 
