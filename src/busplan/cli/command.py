@@ -1,4 +1,4 @@
-"""Options and arguments that commands share: PROFILE, --period, --set, --all, --format, --output and --no-pager, declared and handled once.
+"""Options and arguments that all commands share, declared and handled once: PROFILE, --set, --period, --all, --format.
 
 A command is a function that takes a `Call` and returns its answer; `command` makes it what typer calls.
 """

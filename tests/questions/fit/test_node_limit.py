@@ -12,7 +12,7 @@ import busplan
 from busplan.buses.limits import ExactLimit, Held
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, rounded_up
-from busplan.questions.fit.figures import most_nodes
+from busplan.questions.fit.most_nodes import most_nodes
 from busplan.questions.fit.network import network_of
 
 NETWORK = network_of(busplan.load_profile("paper-4ms"))

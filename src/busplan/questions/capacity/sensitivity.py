@@ -11,7 +11,8 @@ from busplan.buses.limits import Perturbation
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import FITS, TIME, certainty
-from busplan.questions.fit.figures import FitFigures, figures, safe_nodes
+from busplan.questions.fit.figures import FitFigures, figures
+from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.network import at_once, changed, trial, with_payloads
 from busplan.sections.base import TRANSACTION_KINDS, value_at
 from busplan.sections.machine import ProfileGroup

@@ -24,8 +24,9 @@ from busplan.questions.base.arguments import (
 from busplan.questions.base.sentences import execution_sentence
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
-from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes, words_behind
+from busplan.questions.fit.figures import FitFigures, after_reset, figures, words_behind
 from busplan.questions.fit.graded import assumed_rates, given
+from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
 from busplan.questions.fit.network import at_period, changed, network_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at

@@ -15,9 +15,9 @@ from busplan.questions.fit.figures import (
     counts_at,
     fit_numbers,
     has_arrays,
-    most_and_safe_nodes,
     with_counts,
 )
+from busplan.questions.fit.most_nodes import most_and_safe_nodes
 from busplan.questions.fit.network import changed, model_names, trial
 from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import varied_nodes

@@ -25,8 +25,9 @@ from busplan.questions.base.arguments import ProfileLike, load_network, require_
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
-from busplan.questions.fit.figures import FitFigures, safe_nodes, shortest_period_us
+from busplan.questions.fit.figures import FitFigures, shortest_period_us
 from busplan.questions.fit.grid import AXES, Grid, GridPoint, GridPoints, fits_at, points_of
+from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.network import PERIOD, at_period
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (

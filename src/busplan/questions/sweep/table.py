@@ -20,8 +20,9 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import VERDICTS, verdict_code
-from busplan.questions.fit.figures import COUNTS, MostNodes, fit_numbers, most_and_safe_nodes
+from busplan.questions.fit.figures import COUNTS, fit_numbers
 from busplan.questions.fit.grid import Array, Grid
+from busplan.questions.fit.most_nodes import MostNodes, most_and_safe_nodes
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
 from busplan.questions.sweep.values import axis_values, checked_grid, grid_models
