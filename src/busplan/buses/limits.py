@@ -255,6 +255,18 @@ class ExactLimit(Limit):
         return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
 
 
+class NothingUnknown(Limit):
+    """A number of things that are not known must be 0; they keep a limit from being shown, and never break it."""
+
+    def most(self, _network: Network) -> Number:
+        """0."""
+        return 0
+
+    def perhaps(self, network: Network) -> Number:
+        """All of them: what is not known may be well."""
+        return self.value(network)
+
+
 class ShareOfPeriod(Limit):
     """A time that must be over within a share of the period; it must not depend on the period [us]."""
 

@@ -12,7 +12,7 @@ from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
 from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
 from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, traffic_of
 from busplan.buses.can.waiting import message_responses
-from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
 from busplan.elementwise import Number, choose, larger, pointwise, smaller, total, within
@@ -214,7 +214,7 @@ class Load(Limit):
         return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
 
 
-class KnownPeriods(Limit):
+class KnownPeriods(NothingUnknown):
     """Deadlines are shown to be kept only where no period of a message is assumed."""
 
     key = "periods"
@@ -226,21 +226,13 @@ class KnownPeriods(Limit):
         """Messages whose period is assumed [1]."""
         return sum(message.period_grade == "assumed" for message in network.profile.message)
 
-    def most(self, _network: Network) -> Number:
-        """0."""
-        return 0
-
-    def perhaps(self, network: Network) -> Number:
-        """The same number: the assumption may hold [1]."""
-        return self.value(network)
-
     def words(self, network: Network) -> str:
         """Names of the messages whose period is assumed."""
         names = [message.name for message in network.profile.message if message.period_grade == "assumed"]
         return f"the period of {first_of(names, 3)} is assumed: give what their specification or a log says"
 
 
-class KnownSenders(Limit):
+class KnownSenders(NothingUnknown):
     """Deadlines are shown to be kept only where the sender of each message is known, if queues are not by priority."""
 
     key = "senders"
@@ -251,14 +243,6 @@ class KnownSenders(Limit):
     def value(self, network: Network) -> Number:
         """Messages without a sender [1]."""
         return len(_unknown_senders(network))
-
-    def most(self, _network: Network) -> Number:
-        """0."""
-        return 0
-
-    def perhaps(self, network: Network) -> Number:
-        """The same number: nothing may wait in the queues [1]."""
-        return self.value(network)
 
     def words(self, network: Network) -> str:
         """Names of the messages without a sender."""

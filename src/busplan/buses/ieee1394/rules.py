@@ -18,7 +18,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.figures import Ieee1394Figures
 from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
-from busplan.buses.limits import ExactLimit, Limit, nodes_limit
+from busplan.buses.limits import ExactLimit, NothingUnknown, nodes_limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules
 from busplan.elementwise import Number
@@ -53,7 +53,7 @@ def unsafe_words(network: Network) -> str:
     )
 
 
-class UnknownArbitration(Limit):
+class UnknownArbitration(NothingUnknown):
     """Limit of the arbitration above S400: its time is not published, so the cycle is a lower bound."""
 
     key = "arbitration"
@@ -62,14 +62,6 @@ class UnknownArbitration(Limit):
     def value(self, network: Network) -> Number:
         """1 above S400, else 0."""
         return int(not has_gaps(network))
-
-    def most(self, _network: Network) -> Number:
-        """0: no arbitration may be unknown."""
-        return 0
-
-    def perhaps(self, network: Network) -> Number:
-        """All of the value: the limit alone never shows that a cycle is too long."""
-        return self.value(network)
 
     def words(self, network: Network) -> str:
         """Sentence that the cycle is a lower bound."""
