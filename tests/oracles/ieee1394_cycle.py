@@ -268,9 +268,10 @@ def _with(profile: busplan.Profile, *, host_us: float) -> busplan.Profile:
 
 def _starts(profile: busplan.Profile, nodes: int) -> int:
     """Cycle starts in a cycle, from what it needs with and without them."""
-    if not profile.bus.cycle_master:
+    bus: Any = profile.bus
+    if not bus.cycle_master:
         return 0
-    alone = profile.model_copy(update={"bus": profile.bus.model_copy(update={"cycle_master": False})})
+    alone = profile.model_copy(update={"bus": bus.model_copy(update={"cycle_master": False})})
     others_us = exact_required_us(alone, "standard", nodes)
     required_us = exact_required_us(profile, "standard", nodes)
     return round((required_us - others_us) / exact_cycle_start_us(profile, nodes))
@@ -278,7 +279,7 @@ def _starts(profile: busplan.Profile, nodes: int) -> int:
 
 def exact_cycle_start_us(profile: busplan.Profile, nodes: int) -> Fraction:
     """What one cycle start costs; 0 where none are sent. Beyond 124 us there is no time for anything else."""
-    bus = profile.bus
+    bus: Any = profile.bus
     if not bus.cycle_master:
         return Fraction(0)
     hops, gap = _setup(bus.model_dump(), nodes)

@@ -20,7 +20,7 @@ def types_through_the_lazy_names() -> None:
     assert_type(busplan.capacity("paper-4ms"), busplan.CapacityAnswer)
     assert_type(busplan.capacity("paper-4ms").results, tuple[CapacityFigures, ...])
     assert_type(busplan.capacity("paper-4ms").results[0].max_axes, int | None)
-    assert_type(busplan.capacity("paper-4ms").results[0].binding_term, str | None)
+    assert_type(busplan.capacity("paper-4ms").results[0].binding_term, str)
     assert_type(busplan.capacity("paper-4ms").to_dict(), dict[str, Any])
     assert_type(busplan.latency("paper-4ms").transactions[0].phases["latency_us"], float | None)
     assert_type(busplan.timeline("paper-4ms").events[0].start_us, float)

@@ -68,8 +68,8 @@ def _next_commands(call: Call, result: "busplan.CapacityAnswer") -> "tuple[Comma
     """Commands to run next for the same profile."""
     from busplan.forms.blocks import Command
 
-    profile_us, periods = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
-    tried = period_option(periods[0]) if len(periods) == 1 and periods[0] != profile_us else ()
+    profile_us, (tried_us, *others) = result.profile.cycle.period_us, (verdict.period_us for verdict in result.verdicts)
+    tried = period_option(tried_us) if tried_us not in (profile_us, None) and not others else ()
     changed = " ".join((shell_word(call.argument), *change_options(call.changes, period_us=profile_us), *tried))
     second = "circle-test" if all(verdict.all_well for verdict in result.verdicts) else "plan"
     more = "--all" if result.sensitivities else "--sensitivity"

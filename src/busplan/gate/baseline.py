@@ -67,14 +67,13 @@ def figures_of(subject: Subject) -> dict[str, float]:
     figures: dict[str, float | None] = {}
     for model in sorted(model_names(subject.network)):
         capacity = capacity_figures(subject.network, model=model)
-        for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us"):
-            figures[f"{capacity.timing_model}.{name}"] = getattr(capacity, name)
-        for group in capacity.groups:
-            for name in ("max_nodes", "safe_nodes"):
-                figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
+        values, names = capacity.values(), ["max_axes", "margin_us", "safe_axes", "margin_corrected_us"]
+        names += [
+            f"group.{group.name}.{name}" for group in subject.profile.group for name in ("max_nodes", "safe_nodes")
+        ]
         if not subject.profile.has_cycle:
-            for figure in _loads(capacity.bus_figures):
-                figures[f"{capacity.timing_model}.{figure.key}"] = capacity.values()[figure.key]
+            names += [figure.key for figure in _loads(capacity.bus_figures)]
+        figures |= {f"{model}.{name}": values[name] for name in names}
     return {name: value for name, value in figures.items() if value is not None}
 
 

@@ -175,7 +175,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
         way_out = ""
         if failure.name in CONTOUR_MEASURES and failure.value is not None:
             way_out = attack
-        elif is_stability and profile.servo.position_gain_per_s:
+        elif is_stability and value_at(profile, "servo.position_gain_per_s"):
             way_out = "lower servo.position_gain_per_s or what delays the loop"
         yield rules.OF_STABILITY if is_stability else rules.OF_CIRCLE, RuleProblem(key, failure.text, way_out)
 

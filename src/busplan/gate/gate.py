@@ -35,6 +35,7 @@ from busplan.profile.document import Document, LoadedProfile, Spot, decode, read
 from busplan.profile.kinds import path_of
 from busplan.profile.sources import ProfileSource
 from busplan.questions.fit.certainty import deciding_cycle
+from busplan.questions.fit.figures import CycleFigures
 from busplan.sourced import constants_changed
 
 MARK: Final = "busplan:"
@@ -114,12 +115,12 @@ SuppressedBy = Literal["comment", "selection", "baseline"]
 
 
 class Fit(NamedTuple):
-    """Fit of a profile's cycle in its slice, by the timing model that decides."""
+    """Verdict of the timing model that decides, and the fit of a cycle in its slice."""
 
     verdict: str | None = None
     """The verdict: fits, not shown to fit, or does not fit."""
     margin_corrected_us: float | None = None
-    """Time left in the slice, corrected for the bias [us]."""
+    """Time left in the slice, corrected for the bias [us]; None for messages alone."""
     uncertainty_us: float | None = None
     """Expanded uncertainty of the corrected margin [us]."""
     rests_on: tuple[RestsOn, ...] = ()
@@ -260,14 +261,19 @@ def check_document(
         else:
             findings.append(finding)
     here = {known_as(finding.code, finding.key) for finding in (*found, *(each.finding for each in suppressed))}
-    deciding = subject.deciding
-    rests_on = deciding_cycle(subject.network).rests_on()
-    fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us, rests_on)
     not_run = profile.asks_for_circle and not with_circle
     result = _result(document, profile.name, findings)._replace(
-        fit=fit, circle_not_run=not_run, suppressed=tuple(suppressed), mended=tuple(sorted(known - here))
+        fit=_fit(subject), circle_not_run=not_run, suppressed=tuple(suppressed), mended=tuple(sorted(known - here))
     )
     return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
+
+
+def _fit(subject: Subject) -> Fit:
+    deciding = subject.deciding
+    fit = Fit(deciding.verdict, rests_on=deciding_cycle(subject.network).rests_on())
+    if not isinstance(deciding, CycleFigures):
+        return fit
+    return fit._replace(margin_corrected_us=deciding.margin_corrected_us, uncertainty_us=deciding.uncertainty_us)
 
 
 def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:

@@ -182,7 +182,7 @@ def explore(
             variant,
             *chosen,
             points,
-            [verdict.deciding for verdict in verdicts],
+            [verdict.figures for verdict in verdicts],
             circle=circle,
             executor=executor,
             progress=part_of(part, number=1, of=2) if circle else ignored,

@@ -1,7 +1,7 @@
 """Base of all sections of a profile: strictness, ranges, and error messages of our own."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self, TypeVar
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -67,15 +67,6 @@ class Section(BaseModel):
             if "_problems" in vars(section) and (problems := tuple(vars(section)["_problems"](self))):
                 raise refused(*problems)
         return self
-
-
-class Extended(Section):
-    """A section with keys that a type checker does not see: those of a kind of bus, or of the servo core."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, key: str) -> Any:
-            """Value of such a key."""
 
 
 _Section = TypeVar("_Section", bound=Section)

@@ -20,7 +20,6 @@ from busplan.sections.base import (
     TRANSACTION_KINDS,
     Bytes,
     Count,
-    Extended,
     Problem,
     Section,
     TimeUs,
@@ -185,7 +184,7 @@ SliceRatio = Annotated[
 ]
 
 
-class BusSection(Extended):
+class BusSection(Section):
     """Section [bus]. Every kind of bus has `nodes`, where it belongs among its own keys."""
 
     kind: str = Field(description="Kind of bus", examples=["ieee1394"])
@@ -194,7 +193,7 @@ class BusSection(Extended):
         nodes: int | None
 
 
-class CycleSection(Extended):
+class CycleSection(Section):
     """Section [cycle]: the communication period and what of it is for communication."""
 
     period_us: Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
@@ -206,7 +205,7 @@ class CycleSection(Extended):
     )
 
 
-class PayloadSection(Extended):
+class PayloadSection(Section):
     """Section [payload]: what is read from and written to each node in a cycle, fixed and for each of its axes."""
 
     read_bytes: Count | None = Field(

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, TypeVar
 from pydantic import AfterValidator, Field, create_model
 
 from busplan.elementwise import Number
-from busplan.sections.base import Extended, Problem, Section, TransactionKind, refused
+from busplan.sections.base import Problem, Section, TransactionKind, refused
 from busplan.servo.parameters import (
     MAX_LENGTH_MM,
     MAX_SPEED_MM_S,
@@ -115,7 +115,7 @@ def _with(keys: dict[str, Any]) -> Callable[[type[_Model]], type[_Model]]:
 
 
 @_with(_keys(Axis))
-class AxisKeys(Extended):
+class AxisKeys(Section):
     """Keys that can differ between the axes: controller, drive, encoder."""
 
 
@@ -126,17 +126,17 @@ class AxisKeys(Extended):
         for name, field in AxisKeys.model_fields.items()
     }
 )
-class AxisOverride(Extended):
+class AxisOverride(Section):
     """Values of an axis that differ from [servo]."""
 
 
 @_with(_keys(Mechanics))
-class MechanicsSection(Extended):
+class MechanicsSection(Section):
     """Section [mechanics]: what lies between the encoders and the table."""
 
 
 @_with(_keys(Delivery))
-class DeliverySection(Extended):
+class DeliverySection(Section):
     """Section [delivery]: how set-points arrive at the nodes."""
 
 
@@ -150,7 +150,7 @@ _GRADED_TIMING: Final = ("interpolation", "step_us")
         for name in (*AxisKeys.model_fields, *_GRADED_TIMING)
     }
 )
-class ServoGrades(Extended):
+class ServoGrades(Section):
     """Section [servo.grades]: how single values of [servo] are known."""
 
 

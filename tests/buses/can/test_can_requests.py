@@ -14,6 +14,7 @@ import pytest
 
 import busplan
 from busplan import BusplanError
+from busplan.sections.base import value_at
 from tests.buses.can.machines import figures, loaded, responses, terms
 from tests.oracles.can_frames import most_us
 from tests.oracles.request_simulation import Frame, Motor, Sent, simulate
@@ -307,7 +308,7 @@ def test_a_log_without_sync_is_neither_emulated_nor_compared(
 def test_a_new_profile_of_motors_has_no_sync(run: Run, tmp_path: Path) -> None:
     assert run("init", "arm", "--bus", "can-motors", cwd=tmp_path).returncode == 0
     profile = busplan.load_profile(tmp_path / "arm.toml")
-    assert profile.bus.access == "polled"
+    assert value_at(profile, "bus.access") == "polled"
     assert terms(profile)["sync"] == 0
 
 

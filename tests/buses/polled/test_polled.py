@@ -19,6 +19,7 @@ from busplan.buses import kind_named
 from busplan.buses.polled.cycle import PolledCycle
 from busplan.cli import app
 from busplan.questions.fit.network import network_of
+from busplan.sections.base import value_at
 from busplan.sourced import Grade
 from tests.oracles.polled_simulation import DYNAMIXEL, FEETECH, RATIOS, modbus_us, profibus_us, servos_us
 
@@ -409,7 +410,7 @@ def test_a_new_profile_is_of_the_bus_that_is_asked_for(word: str, protocol: str,
     path = tmp_path / "machine.toml"
     done = CliRunner().invoke(app, ["init", str(path), "--bus", word, "--nodes", "6", "--axes", "6"])
     assert done.exit_code == 0, done.output
-    assert busplan.load_profile(path).bus.protocol == protocol
+    assert value_at(busplan.load_profile(path), "bus.protocol") == protocol
 
 
 def test_a_sweep_is_its_points() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan import BusplanError, CalibrateAnswer
 from busplan.buses.ieee1394.constants import c
+from busplan.sections.base import value_at
 
 Make = Callable[..., busplan.Profile]
 Rows = list[tuple[int, float]]
@@ -70,7 +71,7 @@ def test_latencies_of_a_profile_give_its_own_execution_time(
     }
     profile = busplan.load_profile(data.draw(any_profile), changes=split)
     model = data.draw(st.sampled_from([model for model in MODELS if _has(profile, model)]))
-    most = int(c.by_key("MAX_PAYLOAD_BYTES")[profile.bus.speed])
+    most = int(c.by_key("MAX_PAYLOAD_BYTES")[value_at(profile, "bus.speed")])
     sizes = data.draw(st.lists(st.integers(1, most), min_size=2, max_size=8, unique=True))
     plain = busplan.load_profile(profile, changes={"node.execution.worst_extra_us": 0.0})
     rows = [(size, latency_us(plain, kind, size, model), kind) for size in sizes for kind in ("read", "write")]

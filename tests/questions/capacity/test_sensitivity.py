@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
+from busplan.sections.base import value_at
 from tests.registers import shipped_names
 
 Maker = Callable[..., busplan.Profile]
@@ -32,8 +33,8 @@ WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "payload +4 bytes": lambda profile: {
         f"payload.{kind}_bytes": 4 + (getattr(profile.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
     },
-    "one more hop": lambda profile: {"bus.max_hops": profile.bus.max_hops + 1},
-    "one more busy retry": lambda profile: {"cycle.retries": profile.cycle.retries + 1},
+    "one more hop": lambda profile: {"bus.max_hops": value_at(profile, "bus.max_hops") + 1},
+    "one more busy retry": lambda profile: {"cycle.retries": value_at(profile, "cycle.retries") + 1},
     "host time +10 us": lambda profile: {"host.transaction_us": profile.host.transaction_us + 10},  # type: ignore[attr-defined]
     "a bus reset": lambda _one: {"bus.gap_count": 63},
 }
@@ -67,7 +68,7 @@ def test_each_row_is_the_capacity_of_the_profile_with_that_change(
     before, by_change = figures(profile), effects(profile)
     assert set(by_change) == set(WRITTEN)
     for change, effect in by_change.items():
-        if change == "one more hop" and profile.bus.max_hops is None:
+        if change == "one more hop" and value_at(profile, "bus.max_hops") is None:
             assert (effect.margin_change_us, effect.then) == (None, None)
             continue
         after = figures(changed(profile, WRITTEN[change](profile)))

@@ -15,6 +15,7 @@ from busplan.forms import terminal
 from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.figures import capacity_figures
 from busplan.questions.fit.network import network_of
+from busplan.sections.base import value_at
 from tests.registers import shipped_names
 
 Make = Callable[..., busplan.Profile]
@@ -153,7 +154,7 @@ def another(profile: busplan.Profile, key: str) -> busplan.Profile | None:
     value: Any = profile
     for part in key.split("."):
         value = getattr(value, part)
-    if key == "bus.isochronous_us" and not profile.bus.cycle_master:
+    if key == "bus.isochronous_us" and not value_at(profile, "bus.cycle_master"):
         return None
     if key in OTHER:
         return busplan.load_profile(profile, changes={key: OTHER[key]})

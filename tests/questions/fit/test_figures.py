@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
+from busplan.sections.base import value_at
 from tests.oracles.ieee1394_cycle import carries_broadcasts, exact_cycle_start_us, exact_required_us
 
 Make = Callable[..., busplan.Profile]
@@ -23,13 +24,13 @@ def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
     any_profile: st.SearchStrategy[busplan.Profile],
 ) -> None:
     profile = data.draw(any_profile)
-    limit = {"S100": 512, "S200": 1024, "S400": 2048}[profile.bus.speed]
+    limit = {"S100": 512, "S200": 1024, "S400": 2048}[value_at(profile, "bus.speed")]
     available = Fraction(profile.cycle.slice_ratio) * Fraction(profile.cycle.period_us)
 
     largest_bytes = max(profile.node_groups[0].bytes_of(kind) for kind in ("read", "write"))
 
     def good(nodes: int, model: str) -> bool:
-        hops = nodes if profile.bus.max_hops is None else profile.bus.max_hops
+        hops = nodes if value_at(profile, "bus.max_hops") is None else value_at(profile, "bus.max_hops")
         # A float's rounding in the product of two floats is no reason to refuse an exact fit.
         return (
             bool(largest_bytes <= limit)
@@ -176,7 +177,7 @@ def test_max_nodes_never_shrinks_with_the_period(
 ) -> None:
     shorter, longer = busplan.capacity(data.draw(any_profile), period_us=sorted(periods)).periods
     for few, many in zip(shorter, longer, strict=True):
-        assert (few.max_nodes or 0) <= (many.max_nodes or 0)
+        assert (few.values()["max_nodes"] or 0) <= (many.values()["max_nodes"] or 0)
 
 
 def only(profile: busplan.Profile, model: str = "standard") -> Any:

@@ -20,6 +20,7 @@ from busplan.profile.edit import profile_text
 from busplan.profile.sources import load
 from busplan.questions.fit.figures import COUNTS, CapacityFigures
 from busplan.questions.fit.network import network_of
+from busplan.sections.base import value_at
 
 GANTRY = busplan.load_profile("gantry-24")
 
@@ -124,7 +125,11 @@ def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
 ) -> None:
     drawn = data.draw(any_profile)
     profile = changed(
-        drawn, {"bus.nodes": sum(parts), **({"bus.charge_hops": "own"} if own and not drawn.bus.max_hops else {})}
+        drawn,
+        {
+            "bus.nodes": sum(parts),
+            **({"bus.charge_hops": "own"} if own and not value_at(drawn, "bus.max_hops") else {}),
+        },
     )
     split = in_groups(profile, parts)
     for uniform, grouped in zip(busplan.capacity(profile).results, busplan.capacity(split).results, strict=True):

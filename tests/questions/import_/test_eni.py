@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import pytest
 
 import busplan
+from busplan.sections.base import value_at
 
 NOP, APWR, BRD, LRD, LWR, LRW, ARMW = 0, 2, 7, 10, 11, 12, 13
 
@@ -164,7 +165,7 @@ def test_a_value_says_its_line_and_grade(tmp_path: Path) -> None:
     assert (rows["group.Wheel0.axes"].grade, rows["bus.master_us"].grade) == ("derived", "assumed")
     assert "read_bytes = 14            # published: machine.xml:" in answer.text
     assert "Not known, so assumed: bus.sync_shift = 0.5, " in answer.sentences()[-1]
-    assert answer.profile.bus.housekeeping_bytes == (4, 4, 1, 2, 0)
+    assert value_at(answer.profile, "bus.housekeeping_bytes") == (4, 4, 1, 2, 0)
     card = str(busplan.capacity(answer.profile)).partition("\n\n")[0].splitlines()
     assert list(answer.sentences()[-1 - len(card) : -1]) == card
 
@@ -248,8 +249,11 @@ def two_tasks(slower_us: int, *, start: int = 6) -> str:
 def test_devices_of_a_slower_task_go_in_every_nth_cycle(tmp_path: Path) -> None:
     answer = imported(two_tasks(2000), tmp_path)
     profile = answer.profile
-    assert [(group.nodes, group.read_bytes, group.every) for group in profile.group] == [(1, 6, 1), (2, 50, 4)]
-    assert (profile.cycle.period_us, profile.bus.units) == (500, "together")
+    assert [(group.nodes, group.read_bytes, value_at(group, "every")) for group in profile.group] == [
+        (1, 6, 1),
+        (2, 50, 4),
+    ]
+    assert (profile.cycle.period_us, value_at(profile, "bus.units")) == (500, "together")
     # Both frames to the byte where the tasks meet; what the slower frame has beside its data counts in every cycle.
     fast, slow = 40 + 14 + 12 + 6, 40 + 12 + 100
     assert frames_us(profile) == pytest.approx((max(fast, 84) + slow) * 0.08)
@@ -265,7 +269,7 @@ def test_a_slower_task_without_known_devices_or_a_whole_rate_is_in_every_cycle(
     tmp_path: Path, slower_us: int, start: int
 ) -> None:
     answer = imported(two_tasks(slower_us, start=start), tmp_path)
-    assert all(group.every == 1 for group in answer.profile.group)
+    assert all(value_at(group, "every") == 1 for group in answer.profile.group)
     assert any("a further task" in remark for remark in answer.remarks)
 
 

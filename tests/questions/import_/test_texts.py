@@ -8,6 +8,7 @@ from typing import Any, Final
 import pytest
 
 import busplan
+from busplan.sections.base import value_at
 
 FILES: Final = Path(__file__).parent / "files"
 MACHINE: Final = [("CP10", 1, 0, 0, 0), ("DI04", 1, 1, 0, 0), ("AX20", 2, 8, 6, 1)]
@@ -50,7 +51,7 @@ def test_an_eni_has_the_frames_and_a_scan_beside_it_the_delays() -> None:
 
 
 def test_the_ports_of_a_scan_are_known() -> None:
-    assert [group.port for group in imported("slaves.txt", "pdos.txt").profile.group] == [
+    assert [value_at(group, "port") for group in imported("slaves.txt", "pdos.txt").profile.group] == [
         "100BASE-TX",
         "E-bus",
         "100BASE-TX",
@@ -65,7 +66,7 @@ def test_a_hop_over_devices_without_clock_is_shared_out(tmp_path: Path) -> None:
     slaves = tmp_path / "slaves.txt"
     slaves.write_text(f"{head}=== Master 0, Slave 2 ==={drive}=== Master 0, Slave 3 ==={end}", encoding="utf-8")
     answer = busplan.import_profile([slaves, FILES / "pdos.txt"])
-    assert answer.profile.group[-1].delay_us == 0.35
+    assert value_at(answer.profile.group[-1], "delay_us") == 0.35
     assert "shared with 1 without a clock" in answer.text
 
 

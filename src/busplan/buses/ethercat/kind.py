@@ -44,7 +44,7 @@ from busplan.elementwise import Number, choose, larger
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
-from busplan.sections.base import MAX_TIME_US
+from busplan.sections.base import MAX_TIME_US, value_at
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -151,7 +151,7 @@ LIMITS: Final = (
 def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Problem where a circle test is asked for, but no clock makes the axes act at the same time."""
     profile = subject.profile
-    if profile.asks_for_circle and not profile.bus.distributed_clocks:
+    if profile.asks_for_circle and not value_at(profile, "bus.distributed_clocks"):
         yield RuleProblem(
             "bus.distributed_clocks",
             "without them each drive acts when its frame passes, one after the other",

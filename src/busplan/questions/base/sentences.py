@@ -12,7 +12,7 @@ from busplan.forms.numbers import known_decimals, known_text
 from busplan.profile.changes import KeyChanges
 from busplan.profile.edit import value_text
 from busplan.questions.fit.certainty import TIME
-from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.figures import CycleFigures, FitFigures
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def reset_sentence(after: FitFigures | None) -> Iterator[blocks.Sentence]:
         yield blocks.sentence(text, state="warns")
 
 
-def margin_words(figures: FitFigures, broken_limits: Iterable[str]) -> tuple[blocks.Part, ...]:
+def margin_words(figures: CycleFigures, broken_limits: Iterable[str]) -> tuple[blocks.Part, ...]:
     """Margin of a cycle under one timing model, or its excess over limits, without a verdict."""
     available = blocks.attribute_value(AVAILABLE, figures)
     if figures.fits:
@@ -110,7 +110,7 @@ def margin_words(figures: FitFigures, broken_limits: Iterable[str]) -> tuple[blo
     return blocks.joined(*reasons, by=", and ").parts
 
 
-def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[blocks.Part, ...]:
+def margin_parts(figures: CycleFigures, *, unit: bool = True) -> tuple[blocks.Part, ...]:
     """Corrected margin under the model that decides, with its uncertainty if known, in the digits that this allows."""
     margin_us, doubt_us = figures.margin_corrected_us, figures.uncertainty_us
     shown = (blocks.attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
@@ -119,7 +119,7 @@ def margin_parts(figures: FitFigures, *, unit: bool = True) -> tuple[blocks.Part
     return (margin,) if doubt_us is None else (margin, " +/- ", doubt)
 
 
-def time_lines(figures: FitFigures, profile: Profile) -> Iterator[tuple[str, blocks.Sentence]]:
+def time_lines(figures: CycleFigures, profile: Profile) -> Iterator[tuple[str, blocks.Sentence]]:
     """Labels and words on the used and the free time in the slice, under the model that decides."""
     given_us, uncertainty_us, margin_us = (
         figures.available_us,
@@ -140,7 +140,7 @@ def time_lines(figures: FitFigures, profile: Profile) -> Iterator[tuple[str, blo
         yield "free", blocks.Sentence((f"{free}{reserve and f'; {reserve} must stay free'}",))
 
 
-def used_us(figures: FitFigures) -> float:
+def used_us(figures: CycleFigures) -> float:
     """Time that a cycle takes, with the bias of the model [us]."""
     return figures.available_us - (figures.margin_corrected_us or 0.0)
 

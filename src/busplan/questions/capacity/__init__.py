@@ -18,7 +18,7 @@ from busplan.questions.base.arguments import (
 )
 from busplan.questions.capacity.verdict import Verdict, verdicts_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
-from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.figures import CapacityFigures, FitFigures, capacity_figures
 from busplan.questions.fit.grid import GridPoint
 from busplan.questions.fit.network import PERIOD, at_periods, model_names
 from busplan.sections.profile import Profile
@@ -36,7 +36,7 @@ class CapacityAnswer(Answer):
     profile
         The profile.
     periods
-        Figures of each period, one set for each timing model.
+        Figures of each period, one set for each timing model: `CapacityFigures` of a cycle.
     verdicts
         One verdict for each period.
     sensitivities
@@ -44,14 +44,14 @@ class CapacityAnswer(Answer):
     """
 
     profile: Profile
-    periods: tuple[tuple[CapacityFigures, ...], ...]
+    periods: tuple[tuple[FitFigures, ...], ...]
     verdicts: tuple[Verdict, ...]
     sensitivities: "tuple[Sensitivity, ...]" = ()
 
     @property
     def verdict(self) -> VerdictWord:
         """The verdict on the only period, by the timing model that decides."""
-        return cast("VerdictWord", self._deciding.verdict)
+        return cast("VerdictWord", self._figures.verdict)
 
     @property
     def fits(self) -> bool:
@@ -60,22 +60,30 @@ class CapacityAnswer(Answer):
 
     @property
     def margin_us(self) -> float:
-        """Free time in the slice of the only period less the bias: `margin_corrected_us` of the deciding model [us]."""
-        return cast("float", self._deciding.margin_corrected_us)
+        """Free time in the slice of the only period less the bias: `margin_corrected_us` of the deciding model [us].
+
+        BusplanError for messages alone, which have no cycle.
+        """
+        return cast("float", CapacityFigures.of(self._figures).margin_corrected_us)
 
     @property
-    def _deciding(self) -> CapacityFigures:
+    def _figures(self) -> FitFigures:
         if len(self.verdicts) > 1:
             raise BusplanError(
                 f"{len(self.verdicts)} periods have no single verdict: each has its own, "
                 "as verdicts[0].deciding.verdict"
             )
-        return self.verdicts[0].deciding
+        return self.verdicts[0].figures
+
+    @property
+    def figures(self) -> tuple[FitFigures, ...]:
+        """All sets of figures, period by period, and in each period timing model by timing model."""
+        return tuple(figures for at_period in self.periods for figures in at_period)
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
-        """All sets of figures, period by period, and in each period timing model by timing model."""
-        return tuple(figures for at_period in self.periods for figures in at_period)
+        """The `figures`, those of a cycle; BusplanError for messages alone, which have none."""
+        return tuple(map(CapacityFigures.of, self.figures))
 
     def report(self) -> Report:
         """The answer in blocks."""

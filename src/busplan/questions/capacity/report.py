@@ -12,18 +12,19 @@ from busplan.questions.base import sentences
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.verdict import Change, Verdict, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
-from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.figures import COUNTS, CapacityFigures, FitFigures
 
 
 def capacity_report(answer: CapacityAnswer) -> blocks.Report:
     """Report of `capacity`; in CSV, figures of a group have columns with its name."""
     name = answer.profile.name
     results, records = [], []
-    for figures in answer.results:
-        result, groups = figures.by_key(), figures.groups
-        results.append({**result, "groups": list(map(vars, groups))} if groups else result)
-        of_groups = {f"group.{group.name}.{key}": getattr(group, key) for group in groups for key in COUNTS}
-        records.append({**result, **of_groups})
+    for figures in answer.figures:
+        result = record = figures.by_key()
+        if isinstance(figures, CapacityFigures) and figures.groups:
+            result, record = {**result, "groups": list(map(vars, figures.groups))}, {**result, **figures.of_groups}
+        results.append(result)
+        records.append(record)
     return blocks.Report(
         blocks.Sentence(("Capacity of ", blocks.Code(name))),
         tuple(_blocks(answer)),
@@ -61,9 +62,9 @@ def _table(answer: CapacityAnswer) -> blocks.Table:
         f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup and f'; {setup}'}",
         *(blocks.count_value(number, nouns(2, noun)) for number, noun in counts),
     )
-    rows = [row for row in _rows(first.deciding.bus_figures) if not (answer.profile.group and row[0].key in COUNTS)]
+    rows = [row for row in _rows(first.figures.bus_figures) if not (answer.profile.group and row[0].key in COUNTS)]
     if not answer.profile.has_cycle:
-        results = [figures.values() for figures in answer.results]
+        results = [figures.values() for figures in answer.figures]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
     return sentences.figure_table(
         rows,
@@ -89,10 +90,10 @@ def _rows(register: BusFigures) -> list[tuple[Figure, int]]:
 
 def _columns(answer: CapacityAnswer) -> Iterator[sentences.FigureColumn]:
     """A column for each period and timing model, the model that decides first."""
-    deciding = answer.verdicts[0].deciding.timing_model
-    for results in answer.periods:
+    deciding = answer.verdicts[0].figures.timing_model
+    for results, verdict in zip(answer.periods, answer.verdicts, strict=True):
         several = len(answer.periods) > 1
-        group = period(results[0].period_us) if several else ""
+        group = period(verdict.period_us) if several and verdict.period_us else ""
         for figures in sorted(results, key=lambda figures: figures.timing_model != deciding):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
             yield sentences.FigureColumn(
@@ -153,28 +154,34 @@ def _groups_table(answer: CapacityAnswer) -> blocks.Table:
     )
 
 
+def _chosen(figures: FitFigures, *keys: str) -> blocks.Record:
+    """Some figures by key; None for one that messages alone do not have."""
+    values = figures.by_key()
+    return {key: values[key] for key in keys}
+
+
 def _change_record(change: Change) -> blocks.Record:
     return {
         "changes": change.changes,
         "nodes": change.nodes,
-        **sentences.fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
+        **_chosen(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
     }
 
 
 def _verdict(answer: CapacityAnswer, verdict: Verdict) -> blocks.Record:
-    change, figures, summary = verdict.change, verdict.deciding, verdict.card.whole
+    change, figures, summary = verdict.change, verdict.figures, verdict.card.whole
     lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
     return {
         "period_us": verdict.period_us,
-        **sentences.fields(figures, "timing_model", "verdict", "fits"),
+        **_chosen(figures, "timing_model", "verdict", "fits"),
         "missed_limits": [*dict.fromkeys(missed.key for missed in verdict.missed_limits)],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **sentences.safety_record(figures),
-        **sentences.fields(figures, "available_us", "required_us", "margin_us"),
-        **sentences.fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
-        "uncertainty_parts": uncertainty_parts(figures),
+        **_chosen(figures, "available_us", "required_us", "margin_us"),
+        **_chosen(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
+        "uncertainty_parts": uncertainty_parts(verdict.cycle) if verdict.cycle else [],
         "reserve": answer.profile.limits.reserve,
         "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],
         "not_applicable": {model: list(keys) for model, keys in verdict.not_applicable.items()},

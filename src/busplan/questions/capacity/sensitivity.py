@@ -11,7 +11,7 @@ from busplan.buses.limits import Perturbation
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import FITS, TIME, certainty
-from busplan.questions.fit.figures import FitFigures, figures
+from busplan.questions.fit.figures import CycleFigures, cycle_figures
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.network import at_once, changed, trial, with_payloads
 from busplan.sections.base import TRANSACTION_KINDS, value_at
@@ -205,7 +205,7 @@ class Effect(NamedTuple):
     after: Any
     margin_change_us: float | None
     """By how much the corrected margin grows; None if the change cannot be made."""
-    then: FitFigures | None
+    then: CycleFigures | None
     """Figures of the network with the change; None if it cannot be made."""
     note: str
     """Why the change cannot be made; or why the margin stays as it is, and how much nearer other limits come."""
@@ -280,7 +280,7 @@ def _broken_at(network_at: Callable[[float], Network], value: float, *, whole: b
         network = network_at(int(value) if whole else value)
     except BusplanError:
         return None
-    then = figures(network, model=network.bus.deciding_model)
+    then = cycle_figures(network, model=network.bus.deciding_model)
     if then.verdict == FITS:
         return () if then.safe else (network.bus.safety.setting,)
     return then.behind or (TIME,)
@@ -289,7 +289,7 @@ def _broken_at(network_at: Callable[[float], Network], value: float, *, whole: b
 class Sensitivity(NamedTuple):
     """Effects of small changes on the margin at one period, by the timing model that decides."""
 
-    now: FitFigures
+    now: CycleFigures
     effects: tuple[Effect, ...]
     """The largest first; changes that cannot be made come last."""
     next_bottleneck: NextBottleneck
@@ -299,7 +299,7 @@ class Sensitivity(NamedTuple):
 
 def sensitivity_of(network: Network) -> Sensitivity:
     """Every small change of a network, with its cycle computed anew."""
-    now = figures(network, model=network.bus.deciding_model)
+    now = cycle_figures(network, model=network.bus.deciding_model)
     effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     is_well = now.verdict == FITS and now.safe
@@ -307,10 +307,10 @@ def sensitivity_of(network: Network) -> Sensitivity:
     return Sensitivity(now, tuple(effects), next_bottleneck(network), far)
 
 
-def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
+def _effect(cause: Perturbed, now: CycleFigures, network: Network) -> Effect:
     change_us, then = None, None
     if cause.network is not None:
-        then = figures(cause.network, model=now.timing_model)
+        then = cycle_figures(cause.network, model=now.timing_model)
         change_us = (then.margin_corrected_us or 0.0) - (now.margin_corrected_us or 0.0)
     notes = [] if change_us else [cause.note]
     if cause.network is not None and not change_us:

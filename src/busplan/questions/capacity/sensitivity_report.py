@@ -14,7 +14,7 @@ from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.report import capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Reach, Sensitivity
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.figures import CycleFigures
 
 _DECIMALS: Final = 3
 _CHANGE_DIGITS: Final = 4
@@ -184,7 +184,7 @@ def _step(effect: Effect) -> blocks.Cell:
     return blocks.sentence("{} -> {}", before, after)
 
 
-def _verdict(then: FitFigures | None) -> blocks.Cell:
+def _verdict(then: CycleFigures | None) -> blocks.Cell:
     """The verdict with the broken limits, or with the setting that is unsafe."""
     if then is None:
         return blocks.figure_value(VERDICT, None)

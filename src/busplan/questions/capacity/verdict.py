@@ -22,8 +22,10 @@ from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, is_shown_t
 from busplan.questions.fit.cure import NODES, AtPeriod, Changes, Cure, SettingForPeriod, Variants, cure
 from busplan.questions.fit.figures import (
     CapacityFigures,
+    CycleFigures,
     FitFigures,
     GroupCapacity,
+    Judged,
     capacity_figures,
     reset,
     words_behind,
@@ -51,18 +53,18 @@ _BLANK: Final = blocks.Card(blocks.Sentence(()), blocks.Words(""), None, ())
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Judged):
     """Verdict on one period, by the timing model that decides."""
 
     setup: tuple[str, ...]
     """Settings of the bus in force, each in a few words."""
     counted: tuple[tuple[int, str], ...]
     """How large the network is: each number with its noun."""
-    period_us: float
+    period_us: float | None
     """None for a network without a cycle."""
-    deciding: CapacityFigures
+    figures: FitFigures
     """Figures of the timing model that decides, asked for or not."""
-    others: tuple[CapacityFigures, ...]
+    others: tuple[FitFigures, ...]
     """Figures of the other models that were asked for."""
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
@@ -95,23 +97,18 @@ class Verdict:
     @property
     def models_agree(self) -> bool | None:
         """Whether `fits` is the same under every model that was asked for; None where there is no other."""
-        return all(figures.fits == self.deciding.fits for figures in self.others) if self.others else None
+        return all(figures.fits == self.figures.fits for figures in self.others) if self.others else None
 
     @property
     def all_well(self) -> bool:
         """Whether the cycle is shown to fit, on a safe bus, within [limits]."""
-        return self.deciding.verdict == FITS and self.deciding.safe and not self.missed_limits
-
-    @property
-    def has_room(self) -> bool:
-        """Whether more nodes of some group are shown to fit."""
-        return any((count.safe_nodes or 0) > count.nodes for count in self.deciding.counts)
+        return self.figures.verdict == FITS and self.figures.safe and not self.missed_limits
 
 
 class _Trials(NamedTuple):
     """Facts on a network that are known before the figures of what it could become."""
 
-    deciding: CapacityFigures
+    deciding: FitFigures
     variants: Variants
     missed: tuple[MissedLimit, ...]
     mending: Cure
@@ -123,7 +120,7 @@ class _Trials(NamedTuple):
 
 
 def verdicts_of(
-    points: Sequence[GridPoint], results: Sequence[tuple[CapacityFigures, ...]], *, progress: Progress = ignored
+    points: Sequence[GridPoint], results: Sequence[tuple[FitFigures, ...]], *, progress: Progress = ignored
 ) -> list[Verdict]:
     """Verdicts on networks at their periods; those that differ in their period alone share what it has no part in.
 
@@ -153,7 +150,7 @@ def _fits_after(points: Sequence[GridPoint], changed: Sequence[GridPoint | None]
     return [found.get(place) for place in range(len(points))]
 
 
-def _trials(network: Network, results: tuple[CapacityFigures, ...], variants: Variants) -> _Trials:
+def _trials(network: Network, results: tuple[FitFigures, ...], variants: Variants) -> _Trials:
     model = network.bus.deciding_model
     deciding = next((result for result in results if result.timing_model == model), None) or capacity_figures(
         network, model=model
@@ -167,18 +164,19 @@ def _trials(network: Network, results: tuple[CapacityFigures, ...], variants: Va
 
 def _verdict(
     network: Network,
-    results: tuple[CapacityFigures, ...],
+    results: tuple[FitFigures, ...],
     trials: _Trials,
     mended: FitFigures | None,
     after_reset: FitFigures | None,
 ) -> Verdict:
     bus, deciding, variants, mending = network.bus, trials.deciding, trials.variants, trials.mending
     cycle = bus.cycle(network, model=bus.deciding_model)
+    carried = deciding.safe_nodes if isinstance(deciding, CapacityFigures) else None
     verdict = Verdict(
         setup=bus.setup_words(network),
         counted=bus.counted(network),
-        period_us=deciding.period_us,
-        deciding=deciding,
+        period_us=deciding.period_us if isinstance(deciding, CapacityFigures) else None,
+        figures=deciding,
         others=tuple(result for result in results if result is not deciding),
         broken_limits=words_behind(deciding, network),
         missed_limits=trials.missed,
@@ -188,7 +186,7 @@ def _verdict(
         assumptions=variants.assumptions(deciding),
         rests_on=cycle.rests_on(),
         not_applicable=not_applicable(network),
-        warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
+        warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, carried) if n])),
         change=None if mended is None else Change(mending.changes or {}, mended.nodes, mended),
         no_change=mending.why,
     )
@@ -196,11 +194,11 @@ def _verdict(
     return replace(verdict, card=card, brief_card=brief_card)
 
 
-def _change(target: AtPeriod, now: CapacityFigures, *, is_missed: bool) -> tuple[Cure, GridPoint | None]:
+def _change(target: AtPeriod, now: FitFigures, *, is_missed: bool) -> tuple[Cure, GridPoint | None]:
     """The change that mends what is wrong or makes room on a full bus for one more node, and the network after it."""
     more: Changes = {}
     if now.verdict == FITS and now.safe and not is_missed:
-        if now.safe_nodes is None or now.safe_nodes > now.nodes:
+        if not isinstance(now, CapacityFigures) or now.safe_nodes is None or now.safe_nodes > now.nodes:
             return Cure({}), None  # there is room, or nobody said which of the groups is to grow
         if now.safe_nodes == MAX_COUNT:
             return Cure(None, f"{MAX_COUNT} nodes are the most that a profile can have"), None
@@ -234,40 +232,40 @@ def _cards(
 
     The second card is without the lines that are alike for every period.
     """
-    counts = [plural(number, noun) for number, noun in verdict.counted]
-    if network.groups:
-        counts.append(period(verdict.period_us))
+    counts, cycle = [plural(number, noun) for number, noun in verdict.counted], verdict.cycle
+    if cycle:
+        counts.append(period(cycle.period_us))
     title = network.bus.title_of(network)
     subject = blocks.Sentence((blocks.Code(network.profile.name), f"  {title}, {', '.join(counts)}"))
     first = (
         *_reasons(verdict),
-        *(_times(verdict, network) if network.groups else ()),
+        *(_times(verdict, cycle, network) if cycle else ()),
         *((label, blocks.Sentence((words,))) for label, words in bus_lines),
         *_room(verdict, network),
-        *_buses(verdict, network.bus),
+        *(_buses(verdict, cycle, network.bus) if cycle else ()),
     )
     last = tuple(_caveats(verdict))
     brief = blocks.Card(subject, _word(verdict), _gauge(verdict, network), (*first, *last))
     tested = parts_tested(network.bus.evidence_for(network))
-    basis, details = tuple(_basis(verdict, network, tested)), tuple(_details(verdict, network, tested))
+    basis, details = tuple(_basis(verdict, tested)), tuple(_details(verdict, network, tested))
     return brief._replace(lines=(*first, *basis, *last), details=details), brief
 
 
 def _word(verdict: Verdict) -> blocks.Words:
-    word = verdict.deciding.verdict
+    word = verdict.figures.verdict
     but = "" if verdict.all_well or word != FITS else ", BUT"
     state: blocks.State = "passes" if verdict.all_well else "fails" if word == DOES_NOT_FIT or but else "warns"
     return blocks.Words(f"{(word or '').upper()}{but}", state)
 
 
 def _gauge(verdict: Verdict, network: Network) -> blocks.Gauge | None:
-    figures = verdict.deciding
-    state: blocks.State = "passes" if figures.verdict == FITS else "fails"
-    if network.groups:
-        available_us, whole_us = figures.available_us, max(figures.period_us, sentences.used_us(figures))
+    cycle = verdict.cycle
+    state: blocks.State = "passes" if verdict.figures.verdict == FITS else "fails"
+    if cycle:
+        available_us, whole_us = cycle.available_us, max(cycle.period_us, sentences.used_us(cycle))
         return blocks.Gauge(
-            used=sentences.used_us(figures) / whole_us,
-            doubt=(figures.uncertainty_us or 0.0) / whole_us,
+            used=sentences.used_us(cycle) / whole_us,
+            doubt=(cycle.uncertainty_us or 0.0) / whole_us,
             free_until=available_us * (1 - network.profile.limits.reserve) / whole_us,
             most=available_us / whole_us,
             state=state,
@@ -283,33 +281,33 @@ def _gauge(verdict: Verdict, network: Network) -> blocks.Gauge | None:
 def _reasons(verdict: Verdict) -> Iterator[_Line]:
     """Reasons other than time why the machine does not run as the profile has it."""
     for words in verdict.broken_limits:
-        yield "limit", blocks.Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
-    if not verdict.deciding.safe:
-        yield "unsafe", blocks.Sentence((verdict.deciding.safety.setting,), "fails")
-    if verdict.deciding.verdict == FITS:
+        yield "limit", blocks.Sentence((words,), "fails" if verdict.figures.verdict == DOES_NOT_FIT else "warns")
+    if not verdict.figures.safe:
+        yield "unsafe", blocks.Sentence((verdict.figures.safety.setting,), "fails")
+    if verdict.figures.verdict == FITS:
         # Of several groups with too little room, the first.
         first = {missed.key: missed.words for missed in reversed(verdict.missed_limits)}
         yield from (("[limits]", blocks.Sentence((words,), "fails")) for words in reversed(first.values()))
 
 
-def _times(verdict: Verdict, network: Network) -> Iterator[_Line]:
-    yield from sentences.time_lines(verdict.deciding, network.profile)
-    yield "fastest period", _fastest(verdict, network.bus)
+def _times(verdict: Verdict, cycle: CycleFigures, network: Network) -> Iterator[_Line]:
+    yield from sentences.time_lines(cycle, network.profile)
+    yield "fastest period", _fastest(verdict, cycle, network.bus)
 
 
-def _fastest(verdict: Verdict, bus: Bus) -> blocks.Sentence:
+def _fastest(verdict: Verdict, cycle: CycleFigures, bus: Bus) -> blocks.Sentence:
     fastest, best = verdict.fastest, verdict.best_register
     with_best = ""
     if best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in best.changes.items())
-        with_best = f"; {_rounded_up(verdict, best.period_us, bus)} with {values}"
+        with_best = f"; {_rounded_up(best.period_us, cycle, bus)} with {values}"
     if fastest is None or fastest.us is None:
         why = fastest.need.why if fastest else ""
         none = "none, for no period mends the limit" if _beside_limit(verdict, why) is not None else f"none: {why}"
         return blocks.Sentence((f"none{with_best}" if best else none,), "fails")
     key = fastest.need.key
     limited = "" if key == TIME else f", limited by {_limit_label(bus, key)}"
-    return blocks.Sentence((f"{_rounded_up(verdict, fastest.us, bus)}{limited}{with_best}",))
+    return blocks.Sentence((f"{_rounded_up(fastest.us, cycle, bus)}{limited}{with_best}",))
 
 
 def _limit_label(bus: Bus, key: str | None) -> str:
@@ -318,23 +316,22 @@ def _limit_label(bus: Bus, key: str | None) -> str:
     return (limit and limit.label) or str(key)
 
 
-def _rounded_up(verdict: Verdict, us: float, bus: Bus) -> str:
+def _rounded_up(us: float, cycle: CycleFigures, bus: Bus) -> str:
     """A period, rounded up to the digits that its uncertainty allows; one of the bus's list stays as it is."""
     if not bus.periods.us:
-        scale = 10.0 ** known_decimals(us, verdict.deciding.uncertainty_us)
+        scale = 10.0 ** known_decimals(us, cycle.uncertainty_us)
         us = ceil(us * scale * (1 - FIT_ROUNDING)) / scale
     return period(us)
 
 
 def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
     """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
-    figures = verdict.deciding
-    if verdict.all_well and verdict.has_room:
-        spare = [(count, (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
-        rooms = [_more(count, number) for count, number in spare if number > 0]
-        yield "room for", blocks.Sentence((listed(rooms, "or"),))
-        return
-    if verdict.all_well and network.groups:
+    cycle = verdict.cycle
+    if verdict.all_well and cycle:
+        spare = [(count, (count.safe_nodes or 0) - count.nodes) for count in cycle.counts]
+        if rooms := [_more(count, number) for count, number in spare if number > 0]:
+            yield "room for", blocks.Sentence((listed(rooms, "or"),))
+            return
         yield "room for", blocks.Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
@@ -345,8 +342,9 @@ def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
         return
     meanings = sentences.change_meanings(network.bus)
     settings = sentences.settings_sentence(change.changes, meanings=meanings, quotes=False)
-    left_us = change.figures.margin_corrected_us
-    left = "" if left_us is None else f", which leaves {known_text(left_us, change.figures.uncertainty_us)} us"
+    then, left = change.figures, ""
+    if isinstance(then, CycleFigures):
+        left = f", which leaves {known_text(then.margin_corrected_us or 0.0, then.uncertainty_us)} us"
     yield label, blocks.joined(settings, blocks.Sentence((left,)), by="")
 
 
@@ -383,42 +381,40 @@ def rests_on_words(rests_on: Sequence[RestsOn], *, most: int | None) -> str:
     return text
 
 
-def _buses(verdict: Verdict, bus: Bus) -> Iterator[_Line]:
+def _buses(verdict: Verdict, cycle: CapacityFigures, bus: Bus) -> Iterator[_Line]:
     """Number of such buses that would carry all nodes, where one is not shown to."""
-    figures = verdict.deciding
-    most = figures.safe_nodes or 0
-    if 0 < most < figures.nodes:
-        yield (
-            "buses",
-            blocks.Sentence((f"{ceil(figures.nodes / most)} such buses, of {plural(most, 'node')} or fewer",)),
-        )
-    elif most == 0 and figures.verdict != FITS and figures.counts and not figures.groups and not verdict.change:
-        limit = _limit_label(bus, figures.safe_limited_by)
+    most = cycle.safe_nodes or 0
+    if 0 < most < cycle.nodes:
+        yield "buses", blocks.Sentence((f"{ceil(cycle.nodes / most)} such buses, of {plural(most, 'node')} or fewer",))
+    elif most == 0 and cycle.verdict != FITS and not cycle.groups and not verdict.change:
+        limit = _limit_label(bus, cycle.safe_limited_by)
         yield "buses", blocks.Sentence((f"no number: a single node is not shown to fit, limited by {limit}",))
 
 
-def _basis(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
+def _basis(verdict: Verdict, tested: Tested) -> Iterator[_Line]:
     """The largest term and the largest doubt, and what the verdict assumes, leaves out, and was never measured."""
-    figures = verdict.deciding
-    if figures.terms:
-        largest = max(figures.terms, key=lambda term: term.us)
-        us = known_text(largest.us, figures.uncertainty_us)
-        yield "largest term", blocks.Sentence((f"{figures.bus_figures.term_label(largest.name)}, {us} us",))
-    parts = uncertainty_parts(figures)
-    if parts and parts[0]["share"]:
-        part_us = (figures.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
-        yield (
-            "largest doubt",
-            blocks.Sentence((f"{parts[0]['label']}, +/- {known_text(part_us, figures.uncertainty_us)} us",)),
-        )
-    if network.groups and figures.uncertainty_us is None:
-        yield "doubt", blocks.Sentence(("not known",), "warns")
+    if verdict.cycle:
+        yield from _largest(verdict.cycle)
     if verdict.assumptions:
         yield "assumed", blocks.Sentence((_assumed_words(verdict.assumptions),), "warns")
     if verdict.rests_on:
         yield "rests on", blocks.Sentence((rests_on_words(verdict.rests_on, most=_CARD_WORDS),))
-    if network.groups and (never := sentences.never_measured(tested)):
+    if verdict.cycle and (never := sentences.never_measured(tested)):
         yield "never measured", blocks.Sentence((never,))
+
+
+def _largest(cycle: CycleFigures) -> Iterator[_Line]:
+    """The largest term and the largest doubt of a cycle."""
+    term = max(cycle.terms, key=lambda term: term.us)
+    us = known_text(term.us, cycle.uncertainty_us)
+    yield "largest term", blocks.Sentence((f"{cycle.bus_figures.term_label(term.name)}, {us} us",))
+    parts = uncertainty_parts(cycle)
+    if parts and parts[0]["share"]:
+        part_us = (cycle.uncertainty_us or 0.0) * sqrt(parts[0]["share"])
+        words = f"{parts[0]['label']}, +/- {known_text(part_us, cycle.uncertainty_us)} us"
+        yield "largest doubt", blocks.Sentence((words,))
+    if cycle.uncertainty_us is None:
+        yield "doubt", blocks.Sentence(("not known",), "warns")
 
 
 def _assumed_words(assumptions: Sequence[HeavyAssumption]) -> str:
@@ -435,12 +431,12 @@ def _assumed_words(assumptions: Sequence[HeavyAssumption]) -> str:
 
 def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Line]:
     """Lines that the answer needs only when somebody asks: the correction, the published figures, other models."""
-    figures = verdict.deciding
-    if figures.bias_us:
+    cycle = verdict.cycle
+    if cycle and cycle.bias_us:
         words = "included in used: measured buses take this much longer than the timing model"
-        yield "correction", blocks.Sentence((f"{known_text(figures.bias_us, None)} us {words}",))
-    elif network.groups and figures.bias_us is None:
-        (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
+        yield "correction", blocks.Sentence((f"{known_text(cycle.bias_us, None)} us {words}",))
+    elif cycle and cycle.bias_us is None:
+        (error,) = (model.error for model in network.bus.timing_models if model.name == cycle.timing_model)
         yield "correction", blocks.Sentence((f"none: {error}",))
     yield "checked against", blocks.Sentence((sentences.checked_against(tested, with_untested=False),))
     for model, missing in verdict.not_applicable.items():
@@ -449,13 +445,13 @@ def _details(verdict: Verdict, network: Network, tested: Tested) -> Iterator[_Li
 
 def _caveats(verdict: Verdict) -> Iterator[_Line]:
     """Reasons against the verdict at its period: another model, a bus reset, a warning."""
-    deciding = verdict.deciding
+    cycle = verdict.cycle
     for other in verdict.others:
-        if contradicts(other.fits, deciding):
-            needed_us = known_text(other.required_us, deciding.uncertainty_us)
+        if cycle and isinstance(other, CycleFigures) and contradicts(other.fits, cycle):
+            needed_us = known_text(other.required_us, cycle.uncertainty_us)
             fits = "fits" if other.fits else "does not fit"
             words = f"{fits}: {needed_us} us of {known_text(other.available_us, None)}"
-            decides = f"; the {deciding.timing_model} model decides"
+            decides = f"; the {cycle.timing_model} model decides"
             yield f"{other.timing_model} model", blocks.Sentence((f"{words}{decides}",), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in verdict.after_reset.safety.after_reset.items())
@@ -463,9 +459,9 @@ def _caveats(verdict: Verdict) -> Iterator[_Line]:
     yield from (("beware", blocks.Sentence((warning,), "warns")) for warning in verdict.warnings)
 
 
-def uncertainty_parts(figures: CapacityFigures) -> list[blocks.Record]:
+def uncertainty_parts(cycle: CycleFigures) -> list[blocks.Record]:
     """Components of the uncertainty, the largest first."""
-    whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
+    whole = sum(float(doubt.us) ** 2 for doubt in cycle.doubts)
     return [
         {
             "input": doubt.key,
@@ -473,5 +469,5 @@ def uncertainty_parts(figures: CapacityFigures) -> list[blocks.Record]:
             "standard_uncertainty_us": float(doubt.us),
             "share": float(doubt.us) ** 2 / whole if whole else 0.0,
         }
-        for doubt in sorted(figures.doubts, key=lambda doubt: -float(doubt.us))
+        for doubt in sorted(cycle.doubts, key=lambda doubt: -float(doubt.us))
     ]

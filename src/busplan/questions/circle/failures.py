@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 from busplan.buses.network import Network
 from busplan.elementwise import existing
 from busplan.questions.fit.certainty import FITS, TIME
-from busplan.questions.fit.figures import FitFigures, limits_behind
+from busplan.questions.fit.figures import CycleFigures, limits_behind
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
@@ -159,7 +159,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 
-def bus_failures(network: Network, fit: FitFigures) -> tuple[Failure, ...]:
+def bus_failures(network: Network, fit: CycleFigures) -> tuple[Failure, ...]:
     """Limits of the bus that a cycle breaks, or that it is not shown to keep."""
     broken = limits_behind(fit, network)
     of_time: tuple[Failure, ...] = ()

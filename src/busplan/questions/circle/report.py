@@ -20,6 +20,7 @@ from busplan.questions.circle import (
 from busplan.questions.circle.drawing import dial, magnified
 from busplan.questions.circle.failures import MARGINS
 from busplan.questions.circle.shape import ContourProfile
+from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
 
@@ -86,16 +87,15 @@ def _are_zero(profile: Profile) -> str:
 
 def _absent(profile: Profile) -> list[str]:
     """Usual error sources of a machine that a profile does not have."""
-    servo, mechanics, delivery = profile.servo, profile.mechanics, profile.delivery
-    axes = (servo, servo.x, servo.y)
+    axes = ("servo", "servo.x", "servo.y")
     usual = {
-        "drive lag": any(axis.drive_lag_us for axis in axes),
-        "friction at reversals": any(axis.reversal_mm_s for axis in axes),
-        "backlash": mechanics.backlash_mm,
-        "squareness": mechanics.squareness_um_per_m,
-        "jitter": delivery.jitter_us,
+        "drive lag": [f"{axis}.drive_lag_us" for axis in axes],
+        "friction at reversals": [f"{axis}.reversal_mm_s" for axis in axes],
+        "backlash": ["mechanics.backlash_mm"],
+        "squareness": ["mechanics.squareness_um_per_m"],
+        "jitter": ["delivery.jitter_us"],
     }
-    return [name for name, value in usual.items() if not value]
+    return [name for name, keys in usual.items() if not any(value_at(profile, key) for key in keys)]
 
 
 def _unjudged(profile: Profile, result: CircleFigures) -> tuple[blocks.Part, ...]:

@@ -26,7 +26,7 @@ from busplan.questions.fit.circle_setup import (
     path_settling_us,
     require_circle,
 )
-from busplan.questions.fit.figures import FitFigures, figures
+from busplan.questions.fit.figures import CycleFigures, cycle_figures
 from busplan.questions.fit.network import at_periods
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.servo.axis import compiled_kernel
@@ -203,7 +203,7 @@ def run_circles(
     # bus needs no path.
     for variant in variants:
         require_circle(variant)
-    fits = [figures(variant, model=variant.bus.deciding_model) for variant in variants]
+    fits = [cycle_figures(variant, model=variant.bus.deciding_model) for variant in variants]
     setups = [setup_of(variant) if fit.fits else None for variant, fit in zip(variants, fits, strict=True)]
     simulated = [setup for setup in setups if setup]
     to_rank = [sources(setup) if with_contributions and setup else {} for setup in setups]
@@ -253,7 +253,7 @@ class _Counter:
 
 def _test(
     network: Network,
-    fit: FitFigures,
+    fit: CycleFigures,
     setup: Setup | None,
     without: Mapping[str, Setup] | None,
     *,
@@ -295,7 +295,7 @@ def _ranked(run: CircleRun, without: Mapping[str, Setup], *, counter: _Counter) 
     return tuple(sorted(contributions, key=lambda contribution: -contribution.removed_mm))
 
 
-def _figures(network: Network, fit: FitFigures, run: CircleRun | None, *, settled: bool) -> CircleFigures:
+def _figures(network: Network, fit: CycleFigures, run: CircleRun | None, *, settled: bool) -> CircleFigures:
     profile, timing = network.profile, loop_timing(network.profile)
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
     contour = run.contour if run and settled else None

@@ -24,7 +24,7 @@ from busplan.questions.base.arguments import (
 from busplan.questions.base.sentences import execution_sentence
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
-from busplan.questions.fit.figures import FitFigures, after_reset, figures, words_behind
+from busplan.questions.fit.figures import CycleFigures, FitFigures, after_reset, cycle_figures, words_behind
 from busplan.questions.fit.graded import assumed_rates, given
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
@@ -81,7 +81,7 @@ class MachineOnKind(NamedTuple):
     """Keys and sections that the profile sets and this kind does not have."""
     execution: str
     """Meaning of the profile's execution times on another kind; empty where there is nothing to say."""
-    figures: FitFigures
+    figures: CycleFigures
     """Under the timing model that decides, at the profile's period."""
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
@@ -260,7 +260,7 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     if is_own:
         assumed = tuple(AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
     bus = on_kind.bus
-    capacity = figures(on_kind, model=bus.deciding_model)
+    capacity = cycle_figures(on_kind, model=bus.deciding_model)
     return MachineOnKind(
         name=name,
         profile=on_kind.profile,

@@ -17,7 +17,7 @@ from busplan.profile.sources import load_revision
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import Models, ProfileLike, argument, checked_models, finite, load_network
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord
-from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.figures import FitFigures, Judged, capacity_figures
 from busplan.questions.fit.needs import missed_limits
 from busplan.questions.fit.network import model_names, network_of
 from busplan.sections.profile import Profile
@@ -27,8 +27,6 @@ Judgement = Literal["better", "worse", "same", "neutral"]
 
 ROUNDING: Final = 1e-9
 """Relative difference that float rounding can cause; figures that differ by less are the same [1]."""
-_Figures: TypeAlias = Mapping[str, Any]
-"""Figures by key."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +63,13 @@ class ComparedFigure:
 
 
 @dataclass(frozen=True)
-class DiffSide:
+class DiffSide(Judged):
     """One of the two profiles."""
 
     argument: str
     """Argument as given; the name of a `Profile`."""
     profile: Profile
-    deciding: CapacityFigures
+    figures: FitFigures
     """Figures of the timing model that decides."""
     missed_limits: tuple[str, ...]
     """Keys of [limits] that are not kept."""
@@ -79,7 +77,7 @@ class DiffSide:
     @property
     def verdict(self) -> VerdictWord | None:
         """Verdict of the timing model that decides."""
-        return self.deciding.verdict
+        return self.figures.verdict
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -269,16 +267,16 @@ def _figures(
     buses = (network_a.bus, network_b.bus)
     groups = tuple(dict.fromkeys(group.name for side in (a, b) for group in side.profile.group))
     plan = (*plan_figures(*buses), *_of_groups(groups, register.SAFE_NODES))
-    yield from _compared("plan", plan, a.deciding, b.deciding)
+    yield from _compared("plan", plan, a.figures, b.figures)
     cycle = (*cycle_figures(*buses), *_of_groups(groups, register.MAX_NODES))
     if buses[0] is not buses[1]:
-        yield from _compared("deciding", cycle, a.deciding, b.deciding)
+        yield from _compared("deciding", cycle, a.figures, b.figures)
         return
     for model in models:
         yield from _compared(model, cycle, *(_of_model(network, model) for network in (network_a, network_b)))
 
 
-def _of_model(network: Network, model: str) -> CapacityFigures:
+def _of_model(network: Network, model: str) -> FitFigures:
     with constants_changed(network.profile.constants):
         return capacity_figures(network, model=model)
 
@@ -289,17 +287,8 @@ def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
         yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
 
 
-def _by_key(figures: CapacityFigures) -> _Figures:
-    """Figures of one profile by key, those of its groups included."""
-    keys = (register.SAFE_NODES.key, register.MAX_NODES.key)
-    groups = {f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in keys}
-    return {**figures.values(), **groups}
-
-
-def _compared(
-    part: str, measures: Sequence[Figure], of_a: CapacityFigures, of_b: CapacityFigures
-) -> Iterator[ComparedFigure]:
-    a, b = _by_key(of_a), _by_key(of_b)
+def _compared(part: str, measures: Sequence[Figure], of_a: FitFigures, of_b: FitFigures) -> Iterator[ComparedFigure]:
+    a, b = of_a.values(), of_b.values()
     for measure in measures:
         value_a, value_b = a.get(measure.key), b.get(measure.key)
         noise = 0.0 if measure.scale is None else ROUNDING * max(side.get(measure.scale) or 0.0 for side in (a, b))

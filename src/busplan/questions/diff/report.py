@@ -110,7 +110,7 @@ def _sentence(answer: DiffAnswer) -> blocks.Sentence:
 def _verdict(side: DiffSide) -> str:
     word = side.verdict or ""
     buts = [
-        *([] if side.deciding.safe else [f"{side.deciding.safety.setting} is unsafe"]),
+        *([] if side.figures.safe else [f"{side.figures.safety.setting} is unsafe"]),
         *([f"it does not meet {listed(side.missed_limits, 'and')}"] if side.missed_limits else []),
     ]
     verdict = word if word in (FITS, DOES_NOT_FIT) else f"is {word}"
@@ -152,7 +152,7 @@ def _blocks(answer: DiffAnswer, summary: blocks.Sentence) -> Iterator[blocks.Blo
         or (figure.judgement == "neutral" and None not in (figure.a, figure.b))
     ]
     if differ:
-        deciding = {"plan", *(side.deciding.timing_model for side in (answer.a, answer.b))}
+        deciding = {"plan", *(side.figures.timing_model for side in (answer.a, answer.b))}
         first = [figure for figure in differ if figure.judgement != "neutral" and figure.part in deciding] or differ
         rows = (_row(figure)._replace(is_detail=figure not in first) for figure in differ)
         yield blocks.Table(_FIGURES, tuple(rows), heads=3)

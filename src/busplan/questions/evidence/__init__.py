@@ -186,7 +186,7 @@ class _Case:
 
     @cached_property
     def _figures(self) -> CapacityFigures:
-        return capacity_figures(self.network, model=self.model)
+        return CapacityFigures.of(capacity_figures(self.network, model=self.model))
 
     @cached_property
     def _cycle(self) -> BusCycle:

@@ -13,6 +13,7 @@ from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, total, within
+from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import (
     FITS,
     NOT_SHOWN,
@@ -73,10 +74,9 @@ class GroupCapacity:
 
 @dataclass(frozen=True)
 class FitFigures:
-    """Does the cycle fit its period, under one timing model? The `figures` of its bus say what each figure means.
+    """Does a network fit, under one timing model? The `figures` of its bus say what each figure means.
 
-    A network of messages alone has no cycle: then every figure of the cycle, its period among them, is None, whatever
-    its type says.
+    One of messages alone has these figures only; one with a cycle has `CycleFigures`.
     """
 
     kind: str
@@ -86,38 +86,16 @@ class FitFigures:
     safety: Safety
     """Setting of the bus that is safe or not."""
     timing_model: str
-    period_us: float
     nodes: int
     axes: int
-    available_us: float
-    required_us: float
-    time_slice_us: float
-    required_time_slice_us: float
-    terms: tuple[Term, ...]
-    """The parts of `required_us`, in the order of the wire."""
-    utilisation: float
-    margin_us: float
-    binding_term: str | None
-    """Name of the largest term."""
-    min_period_us: float | None
-    """This and `safe_min_period_us` are None if no period that the bus allows is long enough."""
-    min_slice_ratio: float
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
     fits: bool
     """Whether no limit is broken, time among them: required <= available, without bias and uncertainty."""
-    bias_us: float | None
-    """This and the figures down to `verdict` are None under a timing model that does not decide."""
-    margin_corrected_us: float | None
-    uncertainty_us: float | None
-    """None also where U is unknown."""
-    safe_required_us: float | None
-    safe_min_period_us: float | None
     not_shown: tuple[str, ...] | None
-    """Keys of the limits that are neither broken nor shown to be kept, time among them."""
+    """Keys of the limits that are neither broken nor shown to be kept, time among them; None as for `verdict`."""
     verdict: VerdictWord | None
-    doubts: tuple[Doubt, ...]
-    """Components of the uncertainty; empty under a timing model that does not decide."""
+    """None under a timing model that does not decide."""
     safe: bool
     """Whether every safety limit of the bus is kept, such as a gap count that is safe for the hops."""
     own: OwnFigures
@@ -130,15 +108,54 @@ class FitFigures:
         return tuple(key for key in keys if key != TIME)
 
     def values(self) -> dict[str, Any]:
-        """All figures by the keys of their `Figure`s, whether every bus has them or only this kind.
+        """All figures of the kind of bus by key; None for one that the network does not have."""
+        return {**dict.fromkeys(figure.key for figure in self.bus_figures.capacity), **vars(self.own), **vars(self)}
 
-        The terms of a network of messages alone are None.
-        """
-        return {**dict.fromkeys(term.key for term in self.bus_figures.terms), **vars(self.own), **vars(self)}
+    def by_key(self) -> dict[str, Any]:
+        """The figures of the JSON document of `capacity` by key, in its order."""
+        values = self.values()
+        named = {figure.key: values[figure.key] for figure in self.bus_figures.capacity}
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
 
 
 @dataclass(frozen=True)
-class CapacityFigures(FitFigures):
+class CycleFigures(FitFigures):
+    """Does the cycle of a network fit its period, under one timing model?"""
+
+    period_us: float
+    available_us: float
+    required_us: float
+    time_slice_us: float
+    required_time_slice_us: float
+    terms: tuple[Term, ...]
+    """The parts of `required_us`, in the order of the wire."""
+    utilisation: float
+    margin_us: float
+    binding_term: str
+    """Name of the largest term."""
+    min_period_us: float | None
+    """This and `safe_min_period_us` are None if no period that the bus allows is long enough."""
+    min_slice_ratio: float
+    bias_us: float | None
+    """This and the figures below are None under a timing model that does not decide."""
+    margin_corrected_us: float | None
+    uncertainty_us: float | None
+    """None also where U is unknown."""
+    safe_required_us: float | None
+    safe_min_period_us: float | None
+    doubts: tuple[Doubt, ...]
+    """Components of the uncertainty; empty under a timing model that does not decide."""
+
+    @classmethod
+    def of(cls, figures: FitFigures) -> Self:
+        """The same figures, for a type checker; BusplanError for those of messages alone, which have no cycle."""
+        if isinstance(figures, cls):
+            return figures
+        raise BusplanError("a network of messages alone has no cycle")
+
+
+@dataclass(frozen=True)
+class CapacityFigures(CycleFigures):
     """Capacity at one period under one timing model: whether the cycle fits, and how many nodes would."""
 
     counts: tuple[GroupCapacity, ...]
@@ -161,26 +178,48 @@ class CapacityFigures(FitFigures):
 
         None without axes, and under a model that does not decide.
         """
-        most = max(self.counts, key=lambda count: count.axes, default=None)
-        if most is None or not most.axes or most.safe_axes is None:
+        most = max(self.counts, key=lambda count: count.axes)
+        if not most.axes or most.safe_axes is None:
             return None
         return most.safe_axes and most.safe_axes + sum(count.axes for count in self.counts if count is not most)
 
-    def by_key(self) -> dict[str, Any]:
-        """The figures of the JSON document by key, in its order."""
-        values = self.values()
-        named = {figure.key: values[figure.key] for figure in self.bus_figures.capacity}
-        return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
+    @property
+    def of_groups(self) -> dict[str, Any]:
+        """Counts of each [[group]] by dotted key, such as group.gantry.max_nodes."""
+        return {f"group.{group.name}.{key}": getattr(group, key) for group in self.groups for key in COUNTS}
+
+    def values(self) -> dict[str, Any]:
+        """All figures by key, those of groups by their dotted keys."""
+        return {**super().values(), **self.of_groups}
 
 
-def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
-    """Whether a network fits its own period under one timing model, and how many nodes would."""
+class Judged:
+    """A part of an answer that has the figures of the timing model that decides."""
+
+    figures: FitFigures
+    """Figures of the timing model that decides: `CapacityFigures` of a cycle."""
+
+    @property
+    def cycle(self) -> CapacityFigures | None:
+        """The figures of a cycle; None for messages alone."""
+        return self.figures if isinstance(self.figures, CapacityFigures) else None
+
+    @property
+    def deciding(self) -> CapacityFigures:
+        """The figures of a cycle; BusplanError for messages alone, whose `figures` are fewer."""
+        return CapacityFigures.of(self.figures)
+
+
+def capacity_figures(network: Network, *, model: str) -> FitFigures:
+    """Whether a network fits under one timing model; of a cycle `CapacityFigures`, with the nodes that would fit."""
     return with_counts(figures(network, model=model), node_counts(network, model=model))
 
 
-def with_counts(fit: FitFigures, counts: tuple[GroupCapacity, ...]) -> CapacityFigures:
-    """The figures together with the counts of each group."""
-    if not counts or counts[0].name:
+def with_counts(fit: FitFigures, counts: tuple[GroupCapacity, ...]) -> FitFigures:
+    """The figures of a cycle together with the counts of each group; those of messages alone as they are."""
+    if not counts:
+        return fit
+    if counts[0].name:
         return CapacityFigures(**vars(fit), counts=counts, groups=counts)
     return CapacityFigures(**vars(fit), counts=counts, **{key: getattr(counts[0], key) for key in COUNTS})
 
@@ -252,7 +291,9 @@ class FitNumbers(NamedTuple):
     """Setting of the bus that is safe or not."""
     model: str
     numbers: Mapping[str, Number | None]
-    """Figures that every kind of bus has, by key; None for one that the timing model does not have."""
+    """Figures of a cycle that every kind of bus has, by key; None for one that the timing model does not have. Empty
+    for messages alone.
+    """
     own: Mapping[str, Number | None]
     """Figures and terms that only this kind of bus has, by the names of the fields of `record`."""
     record: type[OwnFigures]
@@ -306,42 +347,54 @@ class FitNumbers(NamedTuple):
         exceeded = tuple(key for key, is_broken in self.broken.items() if is_broken)
         not_shown = tuple(key for key, code in self.codes.items() if code == NOT_SHOWN_KEPT)
         numbers = _plain_or_none(self.numbers)
-        return FitFigures(
-            kind=self.kind,
-            bus_figures=self.bus_figures,
-            safety=self.safety,
-            timing_model=self.model,
-            **numbers | {key: int(numbers[key]) for key in ("nodes", "axes")},
-            not_shown=not_shown if self.decides else None,
-            verdict=VERDICTS[int(verdict_code(self.codes))] if self.decides else None,
-            doubts=self.doubts,
-            terms=self.terms,
-            binding_term=max(self.terms, key=lambda term: term.us).name if self.terms else None,
-            exceeded=exceeded,
-            fits=not exceeded,
-            safe=not self.unsafe,
-            own=self.record(**_plain_or_none(self.own)),
-        )
+        shared = {
+            "kind": self.kind,
+            "bus_figures": self.bus_figures,
+            "safety": self.safety,
+            "timing_model": self.model,
+            "exceeded": exceeded,
+            "fits": not exceeded,
+            "not_shown": not_shown if self.decides else None,
+            "verdict": VERDICTS[int(verdict_code(self.codes))] if self.decides else None,
+            "safe": not self.unsafe,
+            "own": self.record(**_plain_or_none(self.own)),
+            **numbers,
+            **{key: int(numbers[key]) for key in ("nodes", "axes")},
+        }
+        if not self.terms:
+            return FitFigures(**shared)
+        binding_term = max(self.terms, key=lambda term: term.us).name
+        return CycleFigures(**shared, terms=self.terms, binding_term=binding_term, doubts=self.doubts)
 
 
 def figures(network: Network, *, model: str) -> FitFigures:
-    """Whether a network fits its own period under one timing model."""
+    """Whether a network fits under one timing model."""
     return fit_numbers(network, model=model).figures()
+
+
+def cycle_figures(network: Network, *, model: str) -> CycleFigures:
+    """Whether a network with a cycle fits its own period under one timing model; BusplanError without a cycle."""
+    return CycleFigures.of(figures(network, model=model))
 
 
 def fit_numbers(network: Network, *, model: str) -> FitNumbers:
     """The figures of a network under one timing model, computed elementwise."""
     bus, cycle, has_cycle = network.bus, network.bus.cycle(network, model=model), bool(network.groups)
-    numbers: dict[str, Number | None] = {**numeric_figures(cycle)}
-    terms, codes = cycle.terms if has_cycle else (), limit_codes(network)
+    numbers: dict[str, Number | None] = {"nodes": network.nodes, "axes": network.axes}
+    late: Number = False
+    terms: tuple[Term, ...] = ()
     doubts: tuple[Doubt, ...] = ()
-    late = within(cycle.required_us, available_us(network)) == 0 if has_cycle else False
+    if has_cycle:
+        numbers |= numeric_figures(cycle)
+        terms, late = cycle.terms, within(cycle.required_us, available_us(network)) == 0
+    codes = limit_codes(network)
     broken = {**{key: code == BROKEN for key, code in codes.items()}, TIME: late}
     if model == bus.deciding_model:
         certain = certainty(cycle)
         codes[TIME], doubts = time_code(certain, network), certain.doubts
-        numbers |= certainty_numbers(certain, cycle)
-    else:
+        if has_cycle:
+            numbers |= certainty_numbers(certain, cycle)
+    elif has_cycle:
         numbers |= dict.fromkeys(_CERTAINTY_KEYS)
     own = {**cycle.figures(), **{term.key: term.us for term in terms}}
     unsafe = total(limit.is_surely_broken(network) for limit in bus.limits if limit.role == "safety") > 0
@@ -361,8 +414,6 @@ _CERTAINTY_KEYS: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "s
 
 def certainty_numbers(certain: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
     """Figures of the certainty of the verdict, computed elementwise."""
-    if not cycle.network.groups:
-        return dict.fromkeys(_CERTAINTY_KEYS)
     uncertainty_us = certain.uncertainty_us
     if certain.bias_us is None:  # with neither a bias nor an uncertainty, U is unknown
         uncertainty_us = choose(uncertainty_us > 0, uncertainty_us, inf)
@@ -375,27 +426,16 @@ def certainty_numbers(certain: Certainty, cycle: BusCycle) -> dict[str, Number |
     }
 
 
-_CYCLE_KEYS: Final = (
-    *("period_us", "available_us", "required_us", "time_slice_us", "required_time_slice_us"),
-    *("utilisation", "margin_us", "min_period_us", "min_slice_ratio"),
-)
-"""Figures that a network without a cycle does not have."""
-
-
 def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
-    """Figures that every kind of bus has, computed from a cycle elementwise.
+    """Figures that every kind of bus has, computed from a cycle elementwise; infinite for one that does not exist.
 
-    Keys are those of `CapacityFigures`; a figure that does not exist is infinite, such as the period without a cycle.
+    Keys are those of `CycleFigures`.
     """
-    if not cycle.network.groups:
-        return {"nodes": 0, "axes": 0, **dict.fromkeys(_CYCLE_KEYS, inf)}
     network = cycle.network
     period_us, ratio, nodes = network.period_us, network.slice_ratio, network.nodes
     given_us, required_us = available_us(network), cycle.required_us
     return {
         "period_us": period_us,
-        "nodes": nodes,
-        "axes": network.axes,
         "available_us": given_us,
         "required_us": required_us,
         "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),

@@ -7,10 +7,10 @@ from typing import Any, Final, NamedTuple
 from busplan.buses.bus import Bus
 from busplan.buses.limits import Key
 from busplan.buses.network import Network
-from busplan.buses.rule import RuleFigures
 from busplan.elementwise import GivenTable, Traced
 from busplan.profile.document import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
+from busplan.questions.fit.figures import CycleFigures, FitFigures
 from busplan.questions.fit.network import at_once, bus_of, trial
 from busplan.sections.base import value_at
 from busplan.sections.cycle import TableExecution
@@ -162,18 +162,9 @@ class HeavyAssumption(NamedTuple):
         return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
 
 
-def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssumption, ...]:
-    """The assumptions that carry more than a quarter of the variance or of the required time."""
-    profile = network.profile
-    variance = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
-    shares: list[_Share] = [
-        ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
-    ]
-    shares += [((term.rests_on,), term.us / figures.required_us, "the required time") for term in figures.terms]
-    # Only keys of the profile have a grade. Execution times come below: they share terms and uncertainty components.
-    shares = [share for share in shares if share[1] > _HEAVY_SHARE and _is_assumed(profile, share[0][0])]
-    shares += _execution_shares(figures, network, variance)
-    shares += _rate_shares(figures, network)
+def heavy_assumptions(figures: FitFigures, network: Network) -> tuple[HeavyAssumption, ...]:
+    """The assumptions that carry more than a quarter of the variance or of the time; of messages alone, of the load."""
+    shares = _shares_of_cycle(figures, network) if isinstance(figures, CycleFigures) else _shares_of_load(network)
     carried: dict[tuple[str, ...], list[tuple[str, float]]] = {}
     for keys, share, whole in shares:
         if share > _HEAVY_SHARE:
@@ -188,11 +179,34 @@ def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssu
     )
 
 
+def _shares_of_cycle(cycle: CycleFigures, network: Network) -> Iterator[_Share]:
+    """Shares of assumptions in the variance of a cycle and in its required time."""
+    variance, profile = sum(float(doubt.us) ** 2 for doubt in cycle.doubts), network.profile
+    shares: list[_Share] = [
+        ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in cycle.doubts if variance
+    ]
+    shares += [((term.rests_on,), term.us / cycle.required_us, "the required time") for term in cycle.terms]
+    # Only keys of the profile have a grade. Execution times come below: they share terms and uncertainty components.
+    yield from (share for share in shares if share[1] > _HEAVY_SHARE and _is_assumed(profile, share[0][0]))
+    yield from _execution_shares(cycle, network, variance)
+    for key, unlimited in _unlimited(network):
+        faster = network.bus.cycle(unlimited._replace(period_us=cycle.period_us), model=cycle.timing_model)
+        yield (key,), 1 - faster.required_us / cycle.required_us, "the required time"
+
+
+def _shares_of_load(network: Network) -> Iterator[_Share]:
+    """Shares of assumed bit rates in the load of messages alone: what an infinite rate saves."""
+    load = network.bus.limit("load")
+    if load is not None:
+        for key, unlimited in _unlimited(network):
+            yield (key,), 1 - load.value(unlimited) / load.value(network), "the load"
+
+
 def _is_assumed(profile: Profile, key: str) -> bool:
     return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
 
 
-def _execution_shares(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
+def _execution_shares(figures: CycleFigures, network: Network, variance: float) -> list[_Share]:
     """Shares of the assumed execution times in the variance, and in the required time: terms shrink without them."""
     network, bus = network._replace(period_us=figures.period_us), network.bus
     assumed = [
@@ -220,13 +234,6 @@ def assumed_rates(network: Network) -> tuple[str, ...]:
     return tuple(key for key in network.bus.rate_keys if _is_assumed(network.profile, key))
 
 
-def _rate_shares(figures: RuleFigures, network: Network) -> Iterator[_Share]:
-    """For each assumed bit rate, what an infinite one saves of the required time, or of the load without a cycle."""
-    bus = network.bus
-    for key in assumed_rates(network):
-        unlimited = trial(network, {key: _INFINITE_KBIT_S})
-        if network.groups:
-            cycle = bus.cycle(unlimited._replace(period_us=figures.period_us), model=figures.timing_model)
-            yield (key,), 1 - cycle.required_us / figures.required_us, "the required time"
-        elif (load := bus.limit("load")) is not None:
-            yield (key,), 1 - load.value(unlimited) / load.value(network), "the load"
+def _unlimited(network: Network) -> Iterator[tuple[str, Network]]:
+    """Each assumed bit rate, with the network where it is infinite."""
+    return ((key, trial(network, {key: _INFINITE_KBIT_S})) for key in assumed_rates(network))

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import (
-    CapacityFigures,
     Counts,
     FitFigures,
     GroupCapacity,
@@ -145,13 +144,13 @@ def fits_at(points: Sequence[GridPoint], *, model: str) -> list[FitFigures]:
     return [found[place] for place in range(len(points))]
 
 
-def capacities(network: Network, points: Sequence[GridPoint]) -> list[tuple[CapacityFigures, ...]]:
+def capacities(network: Network, points: Sequence[GridPoint]) -> list[tuple[FitFigures, ...]]:
     """Capacity at each point of a network's grid, under every timing model that can express it.
 
     The most nodes of a group do not depend on how many it has: points that differ in nothing else share them.
     """
     models = [model_names(point.network) for point in points]
-    results: list[tuple[CapacityFigures, ...]] = [() for _ in points]
+    results: list[tuple[FitFigures, ...]] = [() for _ in points]
     for model in (model.name for model in network.bus.timing_models):
         places = [place for place, names in enumerate(models) if model in names]
         at = [points[place] for place in places]

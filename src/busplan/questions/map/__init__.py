@@ -25,7 +25,7 @@ from busplan.questions.base.arguments import ProfileLike, load_network, require_
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
-from busplan.questions.fit.figures import FitFigures, shortest_period_us
+from busplan.questions.fit.figures import CycleFigures, FitFigures, shortest_period_us
 from busplan.questions.fit.grid import AXES, Grid, GridPoint, GridPoints, fits_at, points_of
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.network import PERIOD, at_period
@@ -81,15 +81,14 @@ class Cell(NamedTuple):
     reasons: tuple[str, ...]
     """Limits that are broken, or not shown to be kept; of a circle, its failures or the keys that prevent its run;
     empty if the cell fits."""
-    binding_term: str | None
-    """The largest term of the cycle."""
     verdict: VerdictWord
-    available_us: float | None
-    """This and the figures below are None for messages alone."""
-    margin_corrected_us: float | None
-    uncertainty_us: float | None
-    """None also where it is unknown."""
     is_safe: bool
+    binding_term: str | None = None
+    """The largest term of the cycle. This and the three figures below are None for messages alone."""
+    available_us: float | None = None
+    margin_corrected_us: float | None = None
+    uncertainty_us: float | None = None
+    """None also where it is unknown."""
     circle_passed: bool | None = None
     """None if no circle was run, or the circle is not judged."""
     max_contour_error_mm: float | None = None
@@ -415,20 +414,20 @@ def _cell(network: Network, fit: FitFigures, x: Value, y: Value | None) -> Cell:
     # "does not fit" outranks "unsafe", which outranks "not shown to fit".
     if unsafe and verdict != DOES_NOT_FIT:
         state, limits = "unsafe", unsafe
-    return Cell(
+    cell = Cell(
         x=x,
         y=y,
         nodes=fit.nodes,
         axes=fit.axes,
         state=state,
         reasons=limits,
-        binding_term=fit.binding_term,
         verdict=verdict,
-        available_us=fit.available_us if network.groups else None,
-        margin_corrected_us=fit.margin_corrected_us,
-        uncertainty_us=fit.uncertainty_us,
         is_safe=fit.safe,
     )
+    if isinstance(fit, CycleFigures):
+        names = ("binding_term", "available_us", "margin_corrected_us", "uncertainty_us")
+        cell = cell._replace(**{name: getattr(fit, name) for name in names})
+    return cell
 
 
 def _with_circles(

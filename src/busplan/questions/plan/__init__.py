@@ -37,7 +37,7 @@ from busplan.questions.fit.cure import (
     settings_to_be_carried,
     stands_in_the_way,
 )
-from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
+from busplan.questions.fit.figures import FitFigures, Judged, after_reset, capacity_figures, figures
 from busplan.questions.fit.needs import Need, most_asking
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of, warnings_of
 from busplan.sections.profile import Profile
@@ -45,7 +45,7 @@ from busplan.sourced import constants_changed
 
 
 @dataclass(frozen=True)
-class Option:
+class Option(Judged):
     """A step of the search: what was changed so far, and what it gives."""
 
     title: str
@@ -53,7 +53,7 @@ class Option:
     """Keys that change in the goal, with their new values, the dearest change first."""
     profile: Profile
     """The goal with the changes."""
-    deciding: CapacityFigures
+    figures: FitFigures
     """Capacity under the timing model that decides."""
     others: tuple[FitFigures, ...]
     """Figures under the other timing models."""
@@ -244,7 +244,7 @@ def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> 
         options=options,
         binding=None if recommended else stands_in_the_way(goal, steps[-1]),
         relaxations=() if recommended else tuple(_relaxations(goal, levels, kept)),
-        after_reset=None if recommended is None else after_reset(networks[-1], recommended.deciding),
+        after_reset=None if recommended is None else after_reset(networks[-1], recommended.figures),
         warnings=warnings_of(goal if recommended is None else networks[-1]),
         meanings=change_meanings(goal.bus),
     )
@@ -257,7 +257,7 @@ def _option(after: Network, step: PlanStep, number: int) -> Option:
         title=f"+ {label}" if number > 1 else label,
         changes=dict(step.changes),
         profile=after.profile,
-        deciding=capacity_figures(after, model=model),
+        figures=capacity_figures(after, model=model),
         others=tuple(figures(after, model=other) for other in model_names(after) if other != model),
         held_by=most_asking(step.unmet, ratio=ratio).key if step.unmet else None,
         recommended=not step.unmet,

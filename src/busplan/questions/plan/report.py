@@ -10,7 +10,7 @@ from busplan.forms.numbers import MISSING, period_value
 from busplan.profile.edit import whole
 from busplan.profile.kinds import flat
 from busplan.questions.base import sentences
-from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.figures import COUNTS, CycleFigures
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.sections.base import TRANSACTION_KINDS
@@ -26,7 +26,7 @@ def plan_report(plan: PlanAnswer) -> blocks.Report:
         sentences.document(
             "plan",
             profile=plan.profile.name,
-            goal=sentences.fields(plan.options[0].deciding, "nodes", "axes"),
+            goal=sentences.fields(plan.options[0].figures, "nodes", "axes"),
             free=[freedom.name for freedom in plan.free],
             **sentences.fields(plan, "period_is_kept", "recommended_changes"),
             binding=None if plan.binding is None else {"constraint": plan.binding.key, "reason": plan.binding.why},
@@ -71,7 +71,7 @@ def _headline(plan: PlanAnswer) -> blocks.Sentence:
         why = blocks.ShownValue("" if plan.binding is None else plan.binding.why, "why")
         none = blocks.Words("NO PLAN", "fails")
         return blocks.Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
-    margin = (" with a corrected margin of ", *sentences.margin_parts(option.deciding)) if option.deciding.terms else ()
+    margin = () if option.cycle is None else (" with a corrected margin of ", *sentences.margin_parts(option.cycle))
     result = (blocks.Words("fits", "passes"), *margin, ".")
     if not option.changes:
         if not plan.wanted:
@@ -99,8 +99,8 @@ def _relaxed(plan: PlanAnswer, relaxation: Relaxation) -> blocks.Sentence:
 
 def _goal(plan: PlanAnswer) -> tuple[blocks.Part, ...]:
     """The goal of the plan."""
-    goal, figures = plan.goal, plan.options[0].deciding
-    if not figures.terms:
+    goal, figures = plan.goal, plan.options[0].figures
+    if not plan.goal.has_cycle:
         return (blocks.Code(goal.name),)
     return (
         *(blocks.Code(goal.name), " with "),
@@ -111,20 +111,19 @@ def _goal(plan: PlanAnswer) -> tuple[blocks.Part, ...]:
 
 
 def _record(plan: PlanAnswer, option: Option) -> blocks.Record:
-    figures, profile, others = option.deciding, option.profile, option.others
-    values = figures.values()
+    figures, profile, others = option.figures, option.profile, option.others
+    values = {**figures.values(), "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None}
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
         **sentences.fields(figures, "timing_model", "verdict", "fits"),
         "fits_other_model": all(model.fits for model in others) if others else None,
-        "margin_us": figures.margin_us,
-        "margin_other_model_us": min((model.margin_us for model in others if profile.has_cycle), default=None),
-        **sentences.fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
+        "margin_us": values["margin_us"],
+        "margin_other_model_us": min((one.margin_us for one in others if isinstance(one, CycleFigures)), default=None),
+        **{key: values[key] for key in ("bias_us", "margin_corrected_us", "uncertainty_us", "binding_term")},
         "held_by": option.held_by,
-        **sentences.fields(figures, "nodes", "axes", *COUNTS, "period_us"),
-        "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
+        **{key: values[key] for key in ("nodes", "axes", *COUNTS, "period_us", "slice_ratio")},
         **{key: values[key] for key in figures.bus_figures.planned},
         # Of the first nodes; a bus of messages alone has none.
         **{
@@ -136,7 +135,7 @@ def _record(plan: PlanAnswer, option: Option) -> blocks.Record:
 
 def _options_table(plan: PlanAnswer) -> blocks.Table:
     """Settings and results of each step that changes something; the recommended one has a mark."""
-    has_counts = any(option.deciding.safe_nodes is not None for option in plan.options)
+    has_counts = any(option.cycle and option.cycle.safe_nodes is not None for option in plan.options)
     columns = (
         blocks.TableColumn("free to change", kind="words"),
         blocks.TableColumn("", kind="words"),
@@ -157,13 +156,14 @@ def _is_idle(plan: PlanAnswer, option: Option) -> bool:
 
 
 def _row(option: Option, *, has_counts: bool) -> blocks.TableRow:
+    cycle = option.cycle
     cells: tuple[blocks.Cell, ...] = (
         option.title,
         "*" * option.recommended,
         sentences.settings_sentence(option.changes, meanings={}) if option.changes else MISSING,
-        option.deciding.bus_figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
+        cycle.bus_figures.term_label(cycle.binding_term) if cycle else MISSING,
         blocks.ShownValue(option.held_by, "held_by"),
-        blocks.Sentence(sentences.margin_parts(option.deciding, unit=False)) if option.deciding.terms else MISSING,
-        *(blocks.attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES) if has_counts),
+        blocks.Sentence(sentences.margin_parts(cycle, unit=False)) if cycle else MISSING,
+        *(blocks.attribute_value(figure, cycle) for figure in (SAFE_NODES, SAFE_AXES) if has_counts),
     )
     return blocks.TableRow(cells, highlighted=option.recommended)

@@ -125,8 +125,8 @@ def _comparison(profiles: "Sequence[ReportedProfile]") -> Table:
         TableRow(
             (
                 SectionLink(reported.profile.name, f"p{number}", shell_word(reported.argument)),
-                *(attribute_value(figure, reported.verdict.deciding) for figure in figures),
-                ShownValue(reported.verdict.deciding.most_axes, SAFE_AXES.key),
+                *(attribute_value(figure, reported.verdict.figures.values()) for figure in figures),
+                ShownValue(reported.verdict.cycle and reported.verdict.cycle.most_axes, SAFE_AXES.key),
             )
         )
         for number, reported in enumerate(profiles, start=1)
@@ -187,7 +187,7 @@ class ReportAnswer(Answer):
         return changed_report(page, changes) if all(profile.changes == changes for profile in self.profiles) else page
 
     def _headline(self) -> str:
-        return "; ".join(f"{each.profile.name}: {each.verdict.deciding.verdict}" for each in self.profiles)
+        return "; ".join(f"{each.profile.name}: {each.verdict.figures.verdict}" for each in self.profiles)
 
 
 def report(

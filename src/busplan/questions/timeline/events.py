@@ -16,7 +16,7 @@ from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
 from busplan.elementwise import Number, existing, is_over
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import available_us, certainty
-from busplan.questions.fit.figures import FitFigures, certainty_numbers, figures, margin_us, words_behind
+from busplan.questions.fit.figures import CycleFigures, certainty_numbers, cycle_figures, margin_us, words_behind
 from busplan.questions.fit.network import model_names, warnings_of
 from busplan.sections.profile import Profile
 
@@ -88,7 +88,7 @@ class Schedule(NamedTuple):
     """A cycle, or the part of it inside a window."""
 
     profile: Profile
-    figures: FitFigures
+    figures: CycleFigures
     """Closed form of the cycle that the verdict is for: time needed, time available, and whether it fits."""
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
@@ -193,7 +193,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     bus, model = network.bus, network.bus.deciding_model if model is None else model
-    closed, of_verdict = figures(network, model=model), bus.cycle(network, model=model)
+    closed, of_verdict = cycle_figures(network, model=model), bus.cycle(network, model=model)
     cycle, cycles = _numbered(of_verdict, number), hyperperiod(of_verdict.rates)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
