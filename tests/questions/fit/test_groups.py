@@ -124,13 +124,8 @@ def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
     data: st.DataObject, parts: list[int], own: bool, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     drawn = data.draw(any_profile)
-    profile = changed(
-        drawn,
-        {
-            "bus.nodes": sum(parts),
-            **({"bus.charge_hops": "own"} if own and not value_at(drawn, "bus.max_hops") else {}),
-        },
-    )
+    charged = {"bus.charge_hops": "own"} if own and not value_at(drawn, "bus.max_hops") else {}
+    profile = changed(drawn, {"bus.nodes": sum(parts), **charged})
     split = in_groups(profile, parts)
     for uniform, grouped in zip(busplan.capacity(profile).results, busplan.capacity(split).results, strict=True):
         assert (grouped.timing_model, grouped.terms) == (uniform.timing_model, uniform.terms)

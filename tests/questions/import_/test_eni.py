@@ -249,10 +249,8 @@ def two_tasks(slower_us: int, *, start: int = 6) -> str:
 def test_devices_of_a_slower_task_go_in_every_nth_cycle(tmp_path: Path) -> None:
     answer = imported(two_tasks(2000), tmp_path)
     profile = answer.profile
-    assert [(group.nodes, group.read_bytes, value_at(group, "every")) for group in profile.group] == [
-        (1, 6, 1),
-        (2, 50, 4),
-    ]
+    groups: Any = profile.group
+    assert [(group.nodes, group.read_bytes, group.every) for group in groups] == [(1, 6, 1), (2, 50, 4)]
     assert (profile.cycle.period_us, value_at(profile, "bus.units")) == (500, "together")
     # Both frames to the byte where the tasks meet; what the slower frame has beside its data counts in every cycle.
     fast, slow = 40 + 14 + 12 + 6, 40 + 12 + 100
