@@ -9,7 +9,7 @@ from busplan.gate.report import Located
 from busplan.questions.compare import MachineOnKind, NotOnKind
 from busplan.questions.diff import KeyDifference
 from busplan.questions.explain.derivation import Step
-from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.figures import CapacityFigures, FitFigures
 from busplan.questions.map import Cell
 from busplan.questions.plan import Option
 
@@ -21,6 +21,8 @@ def types_through_the_lazy_names() -> None:
     assert_type(busplan.capacity("paper-4ms").results, tuple[CapacityFigures, ...])
     assert_type(busplan.capacity("paper-4ms").results[0].max_axes, int | None)
     assert_type(busplan.capacity("paper-4ms").results[0].binding_term, str)
+    assert_type(busplan.capacity("paper-4ms").figures, tuple[FitFigures, ...])
+    assert_type(busplan.capacity("paper-4ms").verdicts[0].deciding.margin_us, float)
     assert_type(busplan.capacity("paper-4ms").to_dict(), dict[str, Any])
     assert_type(busplan.latency("paper-4ms").transactions[0].phases["latency_us"], float | None)
     assert_type(busplan.timeline("paper-4ms").events[0].start_us, float)

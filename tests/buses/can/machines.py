@@ -26,7 +26,7 @@ def text_of(profile: busplan.Profile) -> str:
 
 def figures(profile: Any, model: str = WORST) -> Any:
     """Capacity under a timing model."""
-    (result,) = busplan.capacity(profile, timing_model=[model]).results
+    (result,) = busplan.capacity(profile, timing_model=[model]).figures
     return result
 
 

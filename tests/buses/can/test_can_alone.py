@@ -79,7 +79,7 @@ def test_a_published_network_of_five_messages() -> None:
     )
     us = responses(own)
     assert (us[0], us[3], us[4]) == (420, 1230, 1230)
-    assert busplan.CanMessageFigures.of(busplan.capacity(own).verdicts[0].deciding).bus_load == pytest.approx(
+    assert busplan.CanMessageFigures.of(busplan.capacity(own).verdicts[0].figures).bus_load == pytest.approx(
         0.139, abs=5e-4
     )
 
@@ -220,7 +220,7 @@ def test_identifiers_that_stand_twice_are_told(
 
 def test_the_verdict_is_by_load_and_deadlines() -> None:
     answer = busplan.capacity(car())
-    figures = answer.verdicts[0].deciding
+    figures = answer.verdicts[0].figures
     bits = ((1000 / 33.3) * length for length in (55, 80 + 20, 80 + 60))
     load = sum(us / period_us for us, period_us in zip(bits, (1e6, 1e5, 1e5), strict=True))
     assert busplan.CanMessageFigures.of(figures).bus_load == pytest.approx(load)
@@ -236,11 +236,11 @@ def test_the_verdict_is_by_load_and_deadlines() -> None:
     ):
         assert figures.values()[key] is None
     late = busplan.capacity(car(**{"message.doors.deadline_us": 8000}))
-    assert late.verdicts[0].deciding.exceeded == ("deadline",)
+    assert late.verdicts[0].figures.exceeded == ("deadline",)
     assert late.verdicts[0].change is not None
     assert [*late.verdicts[0].change.changes] == ["bus.bit_rate_kbit_s"]
     full = busplan.capacity(car(**{"limits.max_load": 0.05}))
-    assert full.verdicts[0].deciding.exceeded == ("load",)
+    assert full.verdicts[0].figures.exceeded == ("load",)
 
 
 def test_a_message_without_a_deadline_is_late_only_without_an_end(run: Run, tmp_path: Path) -> None:
@@ -312,12 +312,12 @@ def test_every_question_on_messages_of_either_length_is_answered(
         network(*messages, bit_rate_kbit_s=bit_rate_kbit_s), changes={"bus.identifier_bits": bits}
     )
     (verdict,) = busplan.capacity(own).verdicts
-    fits = verdict.deciding.verdict == "fits"
+    fits = verdict.figures.verdict == "fits"
     assert busplan.check(own).passed == fits
     assert (busplan.plan(own).recommended_changes == {}) == fits
     loads = busplan.sweep(own, vary={"bus.identifier_bits": [11, 29]})["bus_load"]
     each = (
-        busplan.capacity(busplan.load_profile(own, changes={"bus.identifier_bits": each})).results for each in (11, 29)
+        busplan.capacity(busplan.load_profile(own, changes={"bus.identifier_bits": each})).figures for each in (11, 29)
     )
     assert list(loads) == pytest.approx(
         [busplan.CanMessageFigures.of(result).bus_load for results in each for result in results]
@@ -361,7 +361,7 @@ def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
     pictured = busplan.map_(car(), x={"bus.bit_rate_kbit_s": rates}, y={"message.doors.deadline_us": deadlines_us})
     for row in rows:
         own = car(**{key: row[key] for key in vary})
-        (figures,) = busplan.capacity(own, timing_model=row["timing_model"]).results
+        (figures,) = busplan.capacity(own, timing_model=row["timing_model"]).figures
         for key, value in figures.by_key().items():
             assert row[key] == (pytest.approx(value) if isinstance(value, float) else value), key
         if figures.verdict is not None:
@@ -430,3 +430,13 @@ def test_the_report_has_no_part_of_a_cycle(run: Run, tmp_path: Path) -> None:
     assert "car" in page
     for word in ("The cycle to scale", "against period", "Is the circle", "execution time", ">None<", "nan"):
         assert word not in page
+
+
+def test_messages_alone_have_no_figures_of_a_cycle() -> None:
+    answer = busplan.capacity(car())
+    assert not hasattr(answer.verdicts[0].figures, "period_us")
+    for asked in ("results", "margin_us"):
+        with pytest.raises(busplan.BusplanError, match="no cycle"):
+            getattr(answer, asked)
+    with pytest.raises(busplan.BusplanError, match="no cycle"):
+        _ = answer.verdicts[0].deciding

@@ -1,10 +1,10 @@
 """`busplan.diff`: the keys that differ between two profiles, and what that does to every figure."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isclose, isfinite
-from typing import Any, Final, Literal, TypeAlias, TypeGuard
+from typing import Any, Final, Literal, TypeGuard
 
 from busplan.buses import figure as register
 from busplan.buses.bus import Bus
