@@ -35,6 +35,12 @@ def make_profile(**changes: Any) -> busplan.Profile:
     return profile_of(data)
 
 
+def often_few(few: int, most: int) -> st.SearchStrategy[int]:
+    """Numbers from 1, half of them few: some plans fit, and some do not."""
+    return st.one_of(st.integers(1, few), st.integers(1, most))
+
+
+RATIOS = st.one_of(st.just(1.0), st.floats(0.1, 1.0))
 # A strategy costs more to make than to draw from: each is made once.
 TRUTHS = st.booleans()
 OF_ALL: dict[str, st.SearchStrategy[Any]] = {
@@ -43,8 +49,7 @@ OF_ALL: dict[str, st.SearchStrategy[Any]] = {
     "node__execution__measured_gap_count": st.integers(0, 63),
     "bus__speed": st.sampled_from(["S100", "S200", "S400"]),
     "bus__gap_count": st.one_of(st.integers(0, 63), st.just("optimal")),
-    # Some plans fit and some do not: small and large networks.
-    "bus__nodes": st.one_of(st.integers(1, 6), st.integers(1, 80)),
+    "bus__nodes": often_few(6, 80),
     "bus__max_hops": st.one_of(st.none(), st.integers(1, 20)),
     "bus__cable_length_m": st.sampled_from([0.5, 2.0, 4.5]),
     "cycle__period_us": st.floats(1.0, 50_000.0),
@@ -52,8 +57,8 @@ OF_ALL: dict[str, st.SearchStrategy[Any]] = {
     "cycle__nonperiodic_us": st.one_of(st.just(0.0), st.floats(0.0, 500.0)),
     "cycle__sync__ping_us": st.floats(0.0, 5.0),
     "cycle__sync__ping_per_node_us": st.floats(0.0, 5.0),
-    "payload__read_bytes": st.one_of(st.integers(1, 64), st.integers(1, 3000)),
-    "payload__write_bytes": st.one_of(st.integers(1, 64), st.integers(1, 3000)),
+    "payload__read_bytes": often_few(64, 3000),
+    "payload__write_bytes": often_few(64, 3000),
     "payload__overhead_bytes": st.integers(0, 40),
     "node__axes": st.integers(1, 8),
     "node__execution__base_us": st.floats(0.0, 100.0),
@@ -131,12 +136,12 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
             {
                 "kind": st.just("polled"),
                 "protocol": st.just(protocol),
-                "nodes": st.integers(1, 20),
+                "nodes": often_few(3, 20),
                 "bit_rate_kbit_s": st.sampled_from([115.2, 500.0, 1000.0]),
                 "requests": st.sampled_from(ways[protocol]),
                 "reads": st.integers(1, 3),
                 "writes": st.integers(1, 3),
-                "adapter_us": st.floats(0.0, 2000.0),
+                "adapter_us": st.one_of(st.just(0.0), st.floats(0.0, 2000.0)),
                 "host_us": st.floats(0.0, 200.0),
                 "global_control": st.just(is_profibus),
                 "retries": st.integers(0, 2),
@@ -153,7 +158,7 @@ def _sercos3_bus() -> st.SearchStrategy[dict[str, Any]]:
     return st.fixed_dictionaries(
         {
             "kind": st.just("sercos3"),
-            "nodes": st.integers(1, 20),
+            "nodes": often_few(3, 20),
             "version": st.sampled_from(["V1.0", "V1.1"]),
             "hot_plug_field": st.sampled_from(["first", "all"]),
             "timing_method": st.sampled_from(["mdt-at-ucc", "mdt-ucc-at", "at-last"]),
@@ -169,7 +174,7 @@ def _sercos2_bus() -> st.SearchStrategy[dict[str, Any]]:
     return st.fixed_dictionaries(
         {
             "kind": st.just("sercos2"),
-            "nodes": st.integers(1, 20),
+            "nodes": often_few(3, 20),
             "data_rate_mbit_s": st.sampled_from([2, 4, 8, 16]),
             "at_gap_us": st.floats(0.0, 20.0),
             "at_start_us": st.one_of(st.none(), st.floats(0.0, 20.0)),
@@ -193,10 +198,10 @@ def sercos_profiles(
         "bus": own,
         "cycle": {
             "period_us": draw(st.sampled_from(periods_us)),
-            "slice_ratio": draw(st.floats(0.1, 1.0)),
+            "slice_ratio": draw(RATIOS),
             "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
         },
-        "payload": {"read_bytes": draw(st.integers(1, 200)), "write_bytes": draw(st.integers(1, 200))},
+        "payload": {"read_bytes": draw(often_few(16, 200)), "write_bytes": draw(often_few(16, 200))},
         "node": {
             "axes": draw(st.integers(1, 3)),
             "execution": {"kind": "linear", "base_us": draw(st.floats(0.0, 100.0)), "per_byte_us": 0.1},
@@ -215,7 +220,7 @@ def can_profiles(draw: st.DrawFn) -> busplan.Profile:
             "payload_bytes": draw(st.integers(0, 8)),
             "period_us": float(draw(st.integers(2000, 20_000))),
             "jitter_us": float(draw(st.integers(0, 2000))),
-            "deadline_us": draw(st.one_of(st.none(), st.floats(500.0, 20_000.0))),
+            "deadline_us": draw(st.one_of(st.none(), st.none(), st.floats(500.0, 20_000.0))),
         }
         for place in range(draw(st.sampled_from([0, 0, 1, 3])))
     ]
@@ -226,18 +231,18 @@ def can_profiles(draw: st.DrawFn) -> busplan.Profile:
             "kind": "can",
             "bit_rate_kbit_s": draw(st.sampled_from([250, 500, 1000])),
             "identifier_bits": draw(st.sampled_from([11, 29])),
-            "nodes": draw(st.integers(1, 20)),
+            "nodes": draw(often_few(3, 20)),
             "sync_counter": draw(st.booleans()),
         },
         "cycle": {
-            "period_us": draw(st.floats(300.0, 6000.0)),
-            "slice_ratio": draw(st.floats(0.1, 1.0)),
+            "period_us": draw(st.one_of(st.floats(300.0, 6000.0), st.floats(3000.0, 20_000.0))),
+            "slice_ratio": draw(RATIOS),
             "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
         },
         "payload": {
             "pdo_per": draw(st.sampled_from(["node", "axis"])),
-            "read_bytes": draw(st.integers(1, 40)),
-            "write_bytes": draw(st.integers(1, 40)),
+            "read_bytes": draw(often_few(8, 40)),
+            "write_bytes": draw(often_few(8, 40)),
         },
         "node": {
             "axes": draw(st.integers(1, 3)),
@@ -263,7 +268,7 @@ def ethercat_profiles(draw: st.DrawFn) -> busplan.Profile:
         "name": "test",
         "bus": {
             "kind": "ethercat",
-            "nodes": draw(st.integers(1, 40)),
+            "nodes": draw(often_few(5, 40)),
             "master": draw(st.sampled_from([None, "SOEM", "TwinCAT"])),
             "process_data": draw(st.sampled_from([None, "LRW-shared", "LRD-LWR"])),
             "distributed_clocks": draw(st.booleans()),
@@ -276,10 +281,10 @@ def ethercat_profiles(draw: st.DrawFn) -> busplan.Profile:
         },
         "cycle": {
             "period_us": draw(st.floats(60.0, 900.0)),
-            "slice_ratio": draw(st.floats(0.1, 1.0)),
+            "slice_ratio": draw(RATIOS),
             "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
         },
-        "payload": {"read_bytes": draw(st.integers(1, 800)), "write_bytes": draw(st.integers(1, 800))},
+        "payload": {"read_bytes": draw(often_few(16, 800)), "write_bytes": draw(often_few(16, 800))},
         "node": {
             "axes": draw(st.integers(1, 3)),
             "port": draw(st.sampled_from(["100BASE-TX", "E-bus"])),

@@ -380,7 +380,7 @@ def cycle_figures(network: Network, *, model: str) -> CycleFigures:
 def fit_numbers(network: Network, *, model: str) -> FitNumbers:
     """The figures of a network under one timing model, computed elementwise."""
     bus, cycle, has_cycle = network.bus, network.bus.cycle(network, model=model), bool(network.groups)
-    numbers: dict[str, Number | None] = {"nodes": network.nodes, "axes": network.axes}
+    numbers: dict[str, Number | None] = {"nodes": 0, "axes": 0}
     late: Number = False
     terms: tuple[Term, ...] = ()
     doubts: tuple[Doubt, ...] = ()
@@ -436,6 +436,8 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
     given_us, required_us = available_us(network), cycle.required_us
     return {
         "period_us": period_us,
+        "nodes": nodes,
+        "axes": network.axes,
         "available_us": given_us,
         "required_us": required_us,
         "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),
