@@ -172,6 +172,8 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
                     continue
                 # Of groups each has its own; a grid and `compare` count the nodes of one of them.
                 if facts.get("groups") and key in COUNTS:
+                    if name == "compare":
+                        compared_counts_agree(answer.to_dict()["group"], record, facts)
                     continue
                 if name == "explain" and key != "period_us":
                     continue
@@ -184,6 +186,16 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
     if "explain" in answers:
         values = [one["value"] for one in answers["explain"].to_dict()["derivations"]]
         assert any(same(value, facts["required_us"]) for value in values)
+
+
+def compared_counts_agree(name: str, record: Record, facts: Record) -> None:
+    """`compare` counts the nodes of a group as `capacity` does, and the axes of all."""
+    (counted,) = (one for one in facts["groups"] if one["name"] == name)
+    assert [record[key] for key in ("safe_nodes", "safe_limited_by")] == [
+        counted[key] for key in ("safe_nodes", "safe_limited_by")
+    ]
+    most = counted["safe_axes"] and facts["axes"] - counted["axes"] + counted["safe_axes"]
+    assert record["safe_axes"] == (most if counted["axes"] else None)
 
 
 def needs_agree(answers: Mapping[str, Any], facts: Record) -> None:

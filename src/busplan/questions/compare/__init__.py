@@ -24,7 +24,7 @@ from busplan.questions.base.arguments import (
 from busplan.questions.base.sentences import execution_sentence
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
-from busplan.questions.fit.figures import FitFigures, after_reset, figures, words_behind
+from busplan.questions.fit.figures import FitFigures, after_reset, axes_in_all, figures, words_behind
 from busplan.questions.fit.graded import assumed_rates, given
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
@@ -318,9 +318,8 @@ def _safe_axes(network: Network) -> SafeAxes:
     profile = network.profile
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(network, group=varied.name)
-    node_axes = int(varied.node.axes)
-    beside = sum(int(group.nodes) * int(group.node.axes) for group in profile.node_groups if group.name != varied.name)
-    axes = None if not node_axes else beside + nodes * node_axes if nodes else 0
+    counted, safe = (int(number * varied.node.axes) for number in (varied.nodes, nodes))
+    axes = axes_in_all(int(network.axes), counted=counted, safe=safe)
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
 

@@ -161,16 +161,24 @@ class CapacityFigures(FitFigures):
 
         None without axes, and under a model that does not decide.
         """
-        most = max(self.counts, key=lambda count: count.axes, default=None)
-        if most is None or not most.axes or most.safe_axes is None:
-            return None
-        return most.safe_axes and most.safe_axes + sum(count.axes for count in self.counts if count is not most)
+        counted = max(self.counts, key=lambda count: count.axes, default=None)
+        return counted and axes_in_all(self.axes, counted=counted.axes, safe=counted.safe_axes)
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the JSON document by key, in its order."""
         values = self.values()
         named = {figure.key: values[figure.key] for figure in self.bus_figures.capacity}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
+
+
+def axes_in_all(axes: int, *, counted: int, safe: int | None) -> int | None:
+    """The most axes of a network of `axes`, of which one group has `counted` and at most `safe` of it are shown to fit.
+
+    None without axes, and under a model that does not decide.
+    """
+    if not counted or safe is None:
+        return None
+    return safe and axes - counted + safe
 
 
 def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
