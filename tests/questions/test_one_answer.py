@@ -82,6 +82,9 @@ def some_profile(random: Random, folder: Path) -> tuple[busplan.Profile, Path | 
 
 
 def same(left: object, right: object) -> bool:
+    """Whether two values are shown alike, as 2 and 2.0 are not."""
+    if type(left) is not type(right):
+        return False
     if isinstance(left, bool) or isinstance(right, bool) or not isinstance(left, int | float):
         return left == right
     return isinstance(right, int | float) and isclose(left, right, rel_tol=1e-9, abs_tol=1e-9)
@@ -172,13 +175,13 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
                     continue
                 # Of groups each has its own; a grid and `compare` count the nodes of one of them.
                 if facts.get("groups") and key in COUNTS:
-                    if name == "compare":
-                        compared_counts_agree(answer.to_dict()["group"], record, facts)
                     continue
                 if name == "explain" and key != "period_us":
                     continue
                 shown.setdefault(name, set()).add(key)
                 assert same(value, facts[key]), (name, key, value, facts[key])
+    if facts.get("groups") and "compare" in answers:
+        counts_agree(answers["compare"].to_dict(), facts)
     for name in {"latency", "plan", "check", "timeline", "map", "sweep", "compare", "explore"} & answers.keys():
         assert "verdict" in shown[name], name
     for name in {"plan", "check", "timeline", "map", "sweep", "compare", "explore"} & answers.keys():
@@ -188,12 +191,12 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
         assert any(same(value, facts["required_us"]) for value in values)
 
 
-def compared_counts_agree(name: str, record: Record, facts: Record) -> None:
+def counts_agree(compared: Record, facts: Record) -> None:
     """`compare` counts the nodes of a group as `capacity` does, and the axes of all."""
-    (counted,) = (one for one in facts["groups"] if one["name"] == name)
-    assert [record[key] for key in ("safe_nodes", "safe_limited_by")] == [
-        counted[key] for key in ("safe_nodes", "safe_limited_by")
-    ]
+    (record,) = compared["buses"]
+    (counted,) = (one for one in facts["groups"] if one["name"] == compared["group"])
+    for key in ("safe_nodes", "safe_limited_by"):
+        assert record[key] == counted[key]
     most = counted["safe_axes"] and facts["axes"] - counted["axes"] + counted["safe_axes"]
     assert record["safe_axes"] == (most if counted["axes"] else None)
 
