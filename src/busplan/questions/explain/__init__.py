@@ -126,7 +126,7 @@ def explain(
             network.profile,
             assumptions=assumptions(network),
             figures=tuple(explained_figures(network)),
-            equations=tuple(equation_rows()),
+            equations=tuple(equation_rows(network.bus)),
             constants=tuple(constant_rows(network.bus)),
         )
     if not isinstance(figure, str):
