@@ -171,10 +171,9 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
         for record in own(answer.to_dict(), facts):
             for name_here, value in record.items():
                 key = ALSO_CALLED.get(name_here, name_here)
-                if key not in facts or key in OWN or isinstance(value, dict):
-                    continue
                 # Of groups each has its own; a grid and `compare` count the nodes of one of them.
-                if facts.get("groups") and key in COUNTS:
+                is_other = key in OWN or (facts.get("groups") and key in COUNTS)
+                if key not in facts or is_other or isinstance(value, dict):
                     continue
                 if name == "explain" and key != "period_us":
                     continue

@@ -9,7 +9,7 @@ from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.buses.network import Network
 from busplan.buses.published import Tested, parts_tested
 from busplan.english import did_you_mean
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report, Sentence
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
@@ -211,7 +211,7 @@ def compare(
     for name in names:
         if name not in kinds:
             near = did_you_mean(name, kinds)
-            raise BusplanError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
+            raise ArgumentError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
     # A variant that the profile has anyway is its own kind.
     title = variant_called(network.bus.title_of(network))
     is_own = {name for name in network.bus.starter.variants if name == title}
