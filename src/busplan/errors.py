@@ -1,6 +1,6 @@
 """Errors for the user, with and without a place in a file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Literal, NamedTuple
 
 
@@ -17,6 +17,22 @@ class BusplanError(Exception):
     def __init__(self, *problems: str) -> None:
         super().__init__("\n".join(problems))
         self.problems = problems
+
+
+class ArgumentError(BusplanError):
+    """A wrong argument of a question: each problem begins with the argument's name, then its value or a colon."""
+
+    def typed(self, options: Iterable[str]) -> BusplanError:
+        """The error of a command with some options: it names the one that gives the argument, as typed."""
+        names = {option.lstrip("-").replace("-", "_"): option for option in options}
+        return BusplanError(*(_typed(problem, names) for problem in self.problems))
+
+
+def _typed(problem: str, names: Mapping[str, str]) -> str:
+    argument = problem.partition(" ")[0].rstrip(":")
+    # An argument may end in its unit, which is typed with the value of an option.
+    option = next((option for name, option in names.items() if f"{argument}_".startswith(f"{name}_")), argument)
+    return f"{option}{problem.removeprefix(argument)}"
 
 
 class WorkerLostError(BusplanError):

@@ -198,7 +198,7 @@ def test_a_group_is_calibrated_by_its_name(run: Run, refused: Run, tmp_path: Pat
         refused("calibrate", "g.toml", "table-1.csv", cwd=tmp_path)
     )
     unknown = refused("calibrate", "g.toml", "table-1.csv", "--group", "x", cwd=tmp_path)
-    assert "group x: gantry-24 has the groups drives" in str(unknown)
+    assert "--group x: gantry-24 has the groups drives" in str(unknown)
     done = run("calibrate", "g.toml", "table-1.csv", "--group", "tool", "--apply", cwd=tmp_path)
     assert done.returncode == 0
     assert "\n[group.execution]  # of tool\n" in done.stdout

@@ -22,7 +22,7 @@ def test_options_change_the_profile_before_it_is_put_on_other_kinds(run: Run) ->
 
 def test_what_cannot_be_is_refused(refused: Refused) -> None:
     said = refused("compare", "paper-1ms", "--buses", "can,iee1394")
-    assert said.startswith("buses iee1394: no kind of bus; there are ieee1394, ")
+    assert said.startswith("--buses iee1394: no kind of bus; there are ieee1394, ")
     assert said.endswith("did you mean ieee1394?")
     assert "no kind of bus" in refused("compare", "paper-1ms", "--buses", "")
     assert "no such file" in refused("compare", "nowhere")

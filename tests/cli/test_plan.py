@@ -207,10 +207,10 @@ def test_without_a_plan_nothing_is_written(busplan: Run, profile: Path, option: 
         (["mine.toml", "-o", "no/such/folder.toml"], "no folder"),
         (
             ["mine.toml", "--free", "cabling"],
-            "free cabling: there is nothing of that name to free on a bus of kind",
+            "--free cabling: there is nothing of that name to free on a bus of kind",
         ),
         (["mine.toml", "--free", ""], "there are gap_count, slice_ratio, responses, schedule, payload, period, nodes"),
-        (["mine.toml", "--free", "period", "--period", "1ms"], "free period: cycle.period_us was given a value"),
+        (["mine.toml", "--free", "period", "--period", "1ms"], "--free period: cycle.period_us was given a value"),
     ],
 )
 def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: list[str], words: str) -> None:

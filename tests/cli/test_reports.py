@@ -245,7 +245,7 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
         (("plan", "paper-4ms", "--nodes", "two"), "--nodes two: expected a whole number; "),
         (
             ("capacity", "paper-4ms", "--timing-model", "neither"),
-            "timing_model 'neither': expected 'standard' or 'paper', or a list of them, each once",
+            "--timing-model 'neither': expected 'standard' or 'paper', or a list of them, each once",
         ),
         (
             ("latency", "paper-4ms", "--format", "xml"),

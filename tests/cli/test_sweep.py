@@ -77,6 +77,7 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(run: Run, t
 REFUSALS = {
     "--vary bus.nodes=1:9 --top 3": "no such option: --top",
     "--vary bus.nodes=1:9 --jobs 2": "--jobs: needs --circle",
+    "--vary bus.nods=1": "--vary bus.nods: unknown key; did you mean nodes?",
     "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",
     "--vary bus.nodes=1:9 -o rows.npz": "expected a name ending in .txt, .md, .html, .csv, .json, .parquet",
 }

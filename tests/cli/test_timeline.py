@@ -36,8 +36,8 @@ def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path
         (["--from", "5"], "--from 5: expected a time with its unit, as 4ms, 250us or 0.001s"),
         (["--from", "9us", "--to", "9us"], "--from 9us --to 9us: the window must end after it begins"),
         (["--from", "3ms"], "the window from 3000 us shows nothing: the cycle runs from 0 to 2000 us"),
-        (["--transaction", "read:3"], "transaction read:3: expected read or write and a node from 1 to 2, as read:1"),
-        (["--transaction", "ping:1"], "transaction ping:1: expected read or write"),
+        (["--transaction", "read:3"], "--transaction read:3: expected read or write and a node from 1 to 2, as read:1"),
+        (["--transaction", "ping:1"], "--transaction ping:1: expected read or write"),
         (
             ["--transaction", "read:1", "--from", "1ms", "--timing-model", "paper"],
             "shows nothing: the read of node 1 runs from 0.4 to 52.07",

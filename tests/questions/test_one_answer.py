@@ -82,6 +82,9 @@ def some_profile(random: Random, folder: Path) -> tuple[busplan.Profile, Path | 
 
 
 def same(left: object, right: object) -> bool:
+    """Whether two values are shown alike, as 2 and 2.0 are not."""
+    if type(left) is not type(right):
+        return False
     if isinstance(left, bool) or isinstance(right, bool) or not isinstance(left, int | float):
         return left == right
     return isinstance(right, int | float) and isclose(left, right, rel_tol=1e-9, abs_tol=1e-9)
@@ -168,15 +171,16 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
         for record in own(answer.to_dict(), facts):
             for name_here, value in record.items():
                 key = ALSO_CALLED.get(name_here, name_here)
-                if key not in facts or key in OWN or isinstance(value, dict):
-                    continue
                 # Of groups each has its own; a grid and `compare` count the nodes of one of them.
-                if facts.get("groups") and key in COUNTS:
+                is_other = key in OWN or (facts.get("groups") and key in COUNTS)
+                if key not in facts or is_other or isinstance(value, dict):
                     continue
                 if name == "explain" and key != "period_us":
                     continue
                 shown.setdefault(name, set()).add(key)
                 assert same(value, facts[key]), (name, key, value, facts[key])
+    if facts.get("groups") and "compare" in answers:
+        counts_agree(answers["compare"].to_dict(), facts)
     for name in {"latency", "plan", "check", "timeline", "map", "sweep", "compare", "explore"} & answers.keys():
         assert "verdict" in shown[name], name
     for name in {"plan", "check", "timeline", "map", "sweep", "compare", "explore"} & answers.keys():
@@ -184,6 +188,16 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
     if "explain" in answers:
         values = [one["value"] for one in answers["explain"].to_dict()["derivations"]]
         assert any(same(value, facts["required_us"]) for value in values)
+
+
+def counts_agree(compared: Record, facts: Record) -> None:
+    """`compare` counts the nodes of a group as `capacity` does, and the axes of all."""
+    (record,) = compared["buses"]
+    (counted,) = (one for one in facts["groups"] if one["name"] == compared["group"])
+    for key in ("safe_nodes", "safe_limited_by"):
+        assert record[key] == counted[key]
+    most = counted["safe_axes"] and facts["axes"] - counted["axes"] + counted["safe_axes"]
+    assert record["safe_axes"] == (most if counted["axes"] else None)
 
 
 def needs_agree(answers: Mapping[str, Any], facts: Record) -> None:

@@ -262,6 +262,11 @@ class BusCycle(ABC):
         """Time from the start of a cycle at which nodes sample the feedback that it carries, in plain numbers [us]."""
         return 0.0
 
+    @property
+    def takes_at_sync(self) -> bool:
+        """Whether commands of a loop on the host take effect at the next synchronous point, not on arrival."""
+        return bool(self.network.profile.servo.update == "next_sync")
+
     def loop_periods(self, *, at_sync: bool) -> int:
         """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
 

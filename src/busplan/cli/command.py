@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypeAlias, get_args
 
 import typer
+from typer.models import OptionInfo
 
 from busplan.cli.answering import answer, profile_files
 from busplan.cli.options import (
@@ -31,7 +32,7 @@ from busplan.cli.options import (
     time_us,
 )
 from busplan.cli.output import PAGER, PlanFailsError, say
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, SET, KeyChange, KeyChanges, parse_set, require_separate
 
@@ -164,6 +165,12 @@ def command(
     def declared(function: Command) -> Command:
         takes, records, own = _parameters(function)
 
+        def asked_of(**given: Any) -> Any:
+            try:
+                return function(**given)
+            except ArgumentError as error:
+                raise error.typed(filter(None, map(_option, parameters))) from None
+
         @wraps(function)
         def run(**given: Any) -> None:
             asked = {name: given.pop(name) for name in (*before, *after)}
@@ -178,7 +185,7 @@ def command(
 
             with constants_changed(call.changes.changed_constants):
                 if not answers:
-                    function(**given)
+                    asked_of(**given)
                     return
                 with answer(
                     call.form,
@@ -188,7 +195,7 @@ def command(
                     changes=NO_CHANGES if names_changes else call.changes,
                     is_whole=asked.get("all_", False),
                 ) as give:
-                    result = function(**given)
+                    result = asked_of(**given)
                     give(result.answer if isinstance(result, Fails) else result)
             if isinstance(result, Fails):
                 say(*filter(None, (result.words,)))
@@ -220,6 +227,14 @@ def _parameters(function: Command) -> tuple[bool, dict[str, tuple[type, list[str
         else:
             own.append(each)
     return takes, records, [each.replace(kind=Parameter.KEYWORD_ONLY) for each in own]
+
+
+def _option(parameter: Parameter) -> str:
+    """Option of a parameter as typed; empty for an argument without an option."""
+    _, info = get_args(parameter.annotation)
+    if not isinstance(info, OptionInfo):
+        return ""
+    return max(info.param_decls or (f"--{parameter.name.replace('_', '-')}",), key=len)
 
 
 def _keywords(options: Mapping[str, Any]) -> Iterator[Parameter]:

@@ -51,7 +51,9 @@ def _in_words(error: Any) -> str:
             right = _WRONG.get(refused["type"], "{msg}").format(**{**refused, **refused.get("ctx", {})})
             unit = _UNIT.search(param.help or "")
             right += f", in {unit[1]}" if unit and refused["type"].endswith("_parsing") else ""
-        return f"{max(param.opts, key=len)} {refused['input']}: {right}; {hint}"
+        is_of_environment = error.ctx.get_parameter_source(param.name).name == "ENVIRONMENT"
+        typed = f"{param.envvar}=" if is_of_environment else f"{max(param.opts, key=len)} "
+        return f"{typed}{refused['input']}: {right}; {hint}"
     if hasattr(error, "possibilities") and any("--set" in param.opts for param in error.cmd.params):
         # The beginning of an option of the command is more likely meant as that option.
         is_begun = any(option.startswith(f"{error.option_name}-") for option in error.possibilities or ())

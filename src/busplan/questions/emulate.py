@@ -13,7 +13,7 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.emulation import TIMES, Emulation, Emulator, Fault
 from busplan.buses.network import Network
 from busplan.english import did_you_mean, listed, plural
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Code, Report, Sentence
 from busplan.progress import ignored
 from busplan.questions.base.answer import Answer
@@ -123,7 +123,7 @@ def emulate(
         cycles = ceil(finite(duration_us, name="duration_us") / period_us)
     number = whole_number(_CYCLES if cycles is None else cycles, name="cycles")
     if not isinstance(fault, Mapping | None):
-        raise BusplanError(f'fault {fault!r}: expected values by name, as {{"jitter": 50}}')
+        raise ArgumentError(f'fault {fault!r}: expected values by name, as {{"jitter": 50}}')
     values = {name: _value(fault_named(emulator, name), value, period_us) for name, value in (fault or {}).items()}
     random = Random(whole_number(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
@@ -173,7 +173,7 @@ def fault_named(emulator: Emulator, name: str) -> Fault:
     faults = {fault.name: fault for fault in emulator.faults}
     if name not in faults:
         hints = "; ".join(filter(None, (f"there are {', '.join(faults)}", did_you_mean(str(name), faults))))
-        raise BusplanError(f"fault {name}: no such fault of this kind of bus; {hints}")
+        raise ArgumentError(f"fault {name}: no such fault of this kind of bus; {hints}")
     return faults[name]
 
 

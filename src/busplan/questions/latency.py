@@ -216,12 +216,16 @@ def _blocks(answer: LatencyAnswer) -> Iterator[blocks.Block]:
         yield blocks.sentence("A command acts after {}, feedback is {} old, a loop takes {}.", *times)
     yield from _tables(answer)
     if loop and register.deadlines and loop[register.deadlines[0]] is not None:
-        parts = [
-            blocks.ShownValue(loop[key], key, "us", 0) for key in (register.deadlines[0], "pipeline_us") if loop[key]
-        ]
-        of_host = ", of which {} are the host's cycles" if len(parts) > 1 else ""
-        yield blocks.sentence(f"Loop: {{}} from SYNC to the executed command{of_host}.", *parts)
+        keys = (register.deadlines[0], *(key for key in _OF_LOOP if loop[key]))
+        parts = " and ".join(words for key, words in _OF_LOOP.items() if key in keys)
+        effect = "SYNC that applies the command" if "sync_wait_us" in keys else "executed command"
+        whole = f"Loop: {{}} from SYNC to the {effect}{parts and f', of which {parts}'}."
+        yield blocks.sentence(whole, *(blocks.ShownValue(loop[key], key, "us", 0) for key in keys))
     yield from answer.notes
+
+
+_OF_LOOP: Final = {"pipeline_us": "{} are the host's cycles", "sync_wait_us": "{} the wait for that SYNC"}
+"""Parts of a loop that are no work, in words."""
 
 
 def _notes(networks: Sequence[Network]) -> Iterator[blocks.Sentence]:

@@ -9,7 +9,7 @@ from typing import Final
 
 from busplan.buses.rule import RecordedFigure, RecordedVerdict
 from busplan.english import plural
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms import blocks
 from busplan.profile.edit import value_text
 from busplan.progress import Progress
@@ -146,7 +146,7 @@ def measured(
     plan = load_profile(profile)
     share = finite(quantile, name="quantile")
     if not _LEAST_QUANTILE <= share <= 1:
-        raise BusplanError(f"quantile {share:g}: expected a share of {_LEAST_QUANTILE:g} to 1, as 0.999")
+        raise ArgumentError(f"quantile {share:g}: expected a share of {_LEAST_QUANTILE:g} to 1, as 0.999")
     if not isinstance(recording, str | os.PathLike):
         raise BusplanError(f"recording {recording!r}: expected the path of a file")
     source = os.fspath(recording)

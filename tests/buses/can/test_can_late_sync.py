@@ -67,7 +67,11 @@ def test_other_messages_meet_the_next_sync_sooner(tmp_path: Path) -> None:
     path.write_text(text.replace("host_us = 100", "host_us = 0") + message)
 
     def found(period_us: float, jitter_us: float) -> Any:
-        changes = {"bus.sync_jitter_us": jitter_us, "cycle.period_us": period_us}
+        changes = {
+            "bus.sync_jitter_us": jitter_us,
+            "cycle.period_us": period_us,
+            "servo.update": "on_arrival",
+        }
         return responses(busplan.load_profile(path, changes=changes))
 
     punctual, late = found(770, 0), found(770, 20)

@@ -381,7 +381,8 @@ def judged(sent: Traffic, *, slack_us: int = 0) -> Scene | None:
     identifiers += (frame.identifier for _, frame in sent.senders)
     if len(set(identifiers)) < len(identifiers):
         return None
-    lasts_us = responses(sent.profile(1e6))["loop"]
+    on_arrival = busplan.load_profile(sent.profile(1e6), changes={"servo.update": "on_arrival"})
+    lasts_us = responses(on_arrival)["loop"]
     if lasts_us is None:
         return None
     period_us = int(lasts_us) + slack_us

@@ -96,6 +96,14 @@ def test_all_equations_are_explained_by_their_numbers() -> None:
         assert busplan.explain("paper-4ms", f"({number})").derivations
 
 
+def test_equations_are_those_of_the_kind_whatever_was_loaded() -> None:
+    with_all, shared = (
+        {row["function"] for row in busplan.explain(name).equations} for name in ("paper-1ms", "can-servo-8")
+    )
+    assert shared == {"time_slice_us", "required_time_slice_us"}
+    assert with_all > shared
+
+
 def test_the_rows_of_csv_are_the_steps_of_json() -> None:
     answer = busplan.explain("paper-4ms", "required_us", timing_model=["paper", "standard"])
     keys = ("reference", "symbol", "formula", "numbers", "value", "unit")

@@ -1,6 +1,6 @@
 """What a profile does not give and makes a plan worse is said: a property over the schema of every kind."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from math import inf
 from typing import Any, Literal, get_args, get_origin
 
@@ -19,6 +19,15 @@ from busplan.questions.fit.network import network_of
 
 SECTIONS = ("bus", "cycle", "node", "host")
 """What the machine is. A payload, limits and tolerances are what is asked of it: the user states them."""
+MESSAGE = """
+[[message]]
+name = "door"
+identifier = 0x100
+payload_bytes = 8
+period_us = 20000
+"""
+OF_MESSAGE = {"identifier_bits", "per_node", "fd", "brs", "burst", "deadline_us"}
+"""What a message is, and when it must have arrived, the user states, too; without a burst, that it has none."""
 KNOWLEDGE = ("grade", "uncertainty_us", "residual", "measured_gap_count")
 """Ends of keys that say how well another value is known: without that value they say nothing."""
 
@@ -29,10 +38,11 @@ def starters() -> Iterator[Any]:
             yield pytest.param(kind, variant, id=f"{kind} {variant}".strip())
 
 
-def new_profile(kind: str, variant: str) -> busplan.Profile:
-    """The profile that `init` writes."""
+def new_profile(kind: str, variant: str, more: str = "") -> busplan.Profile:
+    """The profile that `init` writes, and more."""
     machine = Machine(shared_out(6, nodes=6), 10_000.0, 4, variant=variant)
-    return validate(decode(machine_text(machine, kind=kind, name="new", file="new.toml").encode(), name="new"))
+    text = machine_text(machine, kind=kind, name="new", file="new.toml") + more
+    return validate(decode(text.encode(), name="new"))
 
 
 def not_given(section: BaseModel, prefix: str) -> Iterator[tuple[str, FieldInfo]]:
@@ -90,39 +100,51 @@ def worth(profile: busplan.Profile) -> Mapping[str, float]:
     return found
 
 
-def worse(kind: str, variant: str) -> Mapping[str, tuple[object, str]]:
-    """Keys that the new profile does not give and that make a plan worse, each with a value and what gets worse."""
-    profile = new_profile(kind, variant)
+def worse(profile: busplan.Profile, left_out: Iterable[tuple[str, FieldInfo]]) -> Mapping[str, tuple[object, str]]:
+    """Keys left out that make a plan worse, each with a value and what gets worse."""
     network = network_of(profile)
     bus, before, found = network.bus, worth(profile), dict[str, tuple[object, str]]()
     usual = {premise.key: premise.usual for premise in deciding_cycle(network).premises}
     # Settings that a plan turns, and words that select a formula, are the design's choice.
     chosen = {key for setting in bus.settings(network) for key in setting.keys}
     chosen |= {key for key, facts in bus.keys.items() if facts.chooses}
-    for section in SECTIONS:
-        part = getattr(profile, section, None)
-        for key, field in () if part is None else not_given(part, section):
-            if key in chosen or key.endswith(KNOWLEDGE):
+    for key, field in left_out:
+        if key in chosen or key.endswith(KNOWLEDGE):
+            continue
+        default = field.get_default(call_default_factory=True)
+        for value in [usual[key]] if usual.get(key) is not None else candidates(field, default):
+            try:
+                after = worth(busplan.load_profile(profile, changes={key: value}))
+            except (BusplanError, ValueError):
                 continue
-            default = field.get_default(call_default_factory=True)
-            for value in [usual[key]] if usual.get(key) is not None else candidates(field, default):
-                try:
-                    after = worth(busplan.load_profile(profile, changes={key: value}))
-                except (BusplanError, ValueError):
-                    continue
-                names = [
-                    name for name in before if after.get(name, -inf) > before[name] + 1e-9 * (1 + abs(before[name]))
-                ]
-                if names:
-                    found[key] = value, names[0]
-                    break
+            names = [name for name in before if after.get(name, -inf) > before[name] + 1e-9 * (1 + abs(before[name]))]
+            if names:
+                found[key] = value, names[0]
+                break
     return found
+
+
+def said(profile: busplan.Profile) -> set[str]:
+    """Keys of the premises that the answers name."""
+    return {part.key for part in deciding_cycle(network_of(profile)).rests_on()}
 
 
 @pytest.mark.parametrize(("kind", "variant"), list(starters()))
 def test_what_is_not_given_and_makes_a_plan_worse_is_said(kind: str, variant: str) -> None:
-    said = {part.key for part in deciding_cycle(network_of(new_profile(kind, variant))).rests_on()}
-    assert {key: why for key, why in worse(kind, variant).items() if key not in said} == {}
+    profile = new_profile(kind, variant)
+    parts = ((section, getattr(profile, section, None)) for section in SECTIONS)
+    left_out = (each for section, part in parts if part is not None for each in not_given(part, section))
+    found = worse(profile, left_out)
+    assert {key: found[key] for key in found.keys() - said(profile)} == {}
+
+
+def test_so_is_what_a_message_does_not_give() -> None:
+    profile: Any = new_profile("can", "", MESSAGE)
+    (message,) = profile.message
+    keys = [each for each in not_given(message, "message.door") if each[0].rpartition(".")[2] not in OF_MESSAGE]
+    found = worse(profile, keys)
+    assert "message.door.jitter_us" in found
+    assert {key: found[key] for key in found.keys() - said(profile)} == {}
 
 
 @pytest.mark.parametrize("kind", ["ieee1394", "can", "polled"])

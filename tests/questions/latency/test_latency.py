@@ -50,7 +50,12 @@ def test_a_payload_outside_the_table_is_refused_with_its_range(make: Make) -> No
 def test_a_loop_over_the_host_is_said_in_a_sentence() -> None:
     first, *_ = str(busplan.latency("ethercat-servo-8")).splitlines()
     assert first == "A command acts after 1500 us, feedback is 604 us old, a loop takes 2000 us."
-    said = "Loop: 8520 us from SYNC to the executed command, of which 5000 us are the host's cycles."
+    of_host = "of which 5000 us are the host's cycles"
+    parts = f"{of_host} and 1480 us the wait for that SYNC"
+    said = f"Loop: 10000 us from SYNC to the SYNC that applies the command, {parts}."
     assert said in str(busplan.latency("canopen-6")).splitlines()
+    said = f"Loop: 8520 us from SYNC to the executed command, {of_host}."
+    on_arrival = busplan.load_profile("canopen-6", changes={"servo.update": "on_arrival"})
+    assert said in str(busplan.latency(on_arrival)).splitlines()
     # The vendors model decides nothing.
     assert "A command acts" not in str(busplan.latency("ethercat-servo-8", timing_model="vendors"))

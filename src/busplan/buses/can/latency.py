@@ -59,6 +59,7 @@ def phases(traffic: Traffic, place: int, name: str) -> dict[str, Number]:
         "frame_us": named(frame_us, "frame_us", "C"),
         "execution_us": 0.0,
         "pipeline_us": 0.0,
+        "sync_wait_us": 0.0,
     }
     own = (message for message in traffic.messages if message.name == name)
     has_deadline = not any(message.deadline_us is NO_DEADLINE_US for message in own)

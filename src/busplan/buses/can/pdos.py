@@ -335,7 +335,7 @@ class PdoCycle(CanCycle):
         return *answers, BusLatency(LOOP, None, self._loop())
 
     def _loop(self) -> dict[str, Number]:
-        """Parts of the way from the instant of SYNC to the last executed command that rests on it."""
+        """Parts of the way from the instant of SYNC to the last executed command that rests on it, or to its SYNC."""
         us = self.by_term
         parts_us = {
             "jitter_us": us["cycle_jitter_us"],
@@ -346,6 +346,11 @@ class PdoCycle(CanCycle):
             "execution_us": us["cycle_wait_us"] + self.traffic.host_us,
             "pipeline_us": self._pipeline_cycles * self.network.period_us,
         }
+        wait_us: Number = 0.0
+        if self.takes_at_sync:
+            executed_us = total(us for key, us in parts_us.items() if key != "pipeline_us")
+            wait_us = named(larger(self.network.period_us - executed_us, 0.0), "sync_wait_us", "wait")
+        parts_us["sync_wait_us"] = wait_us
         return numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
 
     @property

@@ -33,6 +33,11 @@ class RequestCycle(PdoCycle):
         return "frames of a burst wait" if self._is_burst else super().bound_words
 
     @property
+    def takes_at_sync(self) -> bool:
+        """No: there is no SYNC to wait for."""
+        return False
+
+    @property
     def sync_us(self) -> Number:
         """No SYNC [us]."""
         return 0.0

@@ -287,13 +287,22 @@ class EthercatCycle(BusCycle):
             left -= passed
         return float(sent_us + way_us)
 
+    @property
+    def takes_at_sync(self) -> bool:
+        """Whether commands wait for SYNC0: without distributed clocks a drive acts when its frame has passed."""
+        return super().takes_at_sync and self.bus.distributed_clocks
+
+    def sampled_us(self) -> float:
+        """Time of SYNC0, at which drives sample; 0 without distributed clocks [us]."""
+        return float(sync0_us(self.network))
+
     def loop_periods(self, *, at_sync: bool) -> int:
         """Periods inside a loop: the master's pipeline, and the waits for a frame and for SYNC0 [1].
 
         The slowest group counts; groups at slower rates are left out.
         """
         network, period_us = self.network, self.network.period_us
-        shift_us = sync0_us(network) if at_sync else 0.0
+        shift_us = self.sampled_us()
         last_us = self.arrival_us(int(network.nodes))
 
         def waits(group: Group) -> float:
@@ -358,7 +367,7 @@ class EthercatCycle(BusCycle):
         network, bus = self.network, self.bus
         taken_us = self._taken_us(group)
         wait_us: Number = 0.0
-        if bus.distributed_clocks:
+        if self.takes_at_sync:
             late = larger(rounded_up((taken_us - sync0_us(network)) / network.period_us), 0)
             wait_us = sync0_us(network) + late * network.period_us - taken_us
         return {

@@ -207,7 +207,7 @@ class Ethercat(Bus):
         """\
 [bus]
 kind = "ethercat"
-# master = "SOEM"          # or IgH, ethercrab, TwinCAT, acontis; of an unknown one the most bytes are taken
+# master = "SOEM"          # or IgH, ethercrab, TwinCAT, acontis; without it the most bytes of all but ethercrab
 distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
 # master_jitter_us = 20    # latest start of its frames after the task: measure it under load; default 0""",
         node="""\

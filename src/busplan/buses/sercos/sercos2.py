@@ -66,7 +66,7 @@ def start_us(data_rate_mbit_s: Number) -> Number:
 _IEC: Final = "IEC 61491"
 
 DATA_RATE: Final = Figure(
-    "data_rate_mbit_s", "f", "profile", "data rate of the ring", "data rate, Mbit/s", decimals=None
+    "data_rate_mbit_s", "f", "profile", "data rate of the ring", "data rate, Mbit/s", sort="count"
 )
 MDT_BYTES: Final = Figure(
     "mdt_bytes", "s_MDT", _IEC, "data of the master data telegram", "data of the MDT", sort="count"
@@ -102,8 +102,8 @@ FIGURES: Final = BusFigures(
 class Sercos2Figures(OwnFigures):
     """Figures of SERCOS I and II alone, by the keys of `FIGURES`."""
 
-    data_rate_mbit_s: float
-    mdt_bytes: float
+    data_rate_mbit_s: int
+    mdt_bytes: int
     cycle_mst_us: float
     cycle_at_us: float
     cycle_gap_us: float

@@ -8,7 +8,7 @@ from typing import Any, Final, ParamSpec, TypeVar, cast
 
 from busplan.buses.network import Network
 from busplan.english import listed
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 from busplan.profile.document import override
 from busplan.profile.edit import value_text
@@ -106,10 +106,10 @@ def require_cycle(profile: Profile, *, question: str, instead: str = "") -> Prof
 def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:
     """New values by dotted key, converted from NumPy; other arguments raise BusplanError."""
     if not isinstance(values, Mapping | None):
-        raise BusplanError(f'{name} {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
+        raise ArgumentError(f'{name} {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
     for key in values or {}:
         if not isinstance(key, str):
-            raise BusplanError(f"{name} {key!r}: expected a dotted key of the profile, as bus.nodes")
+            raise ArgumentError(f"{name} {key!r}: expected a dotted key of the profile, as bus.nodes")
     return {key: from_numpy(value) for key, value in (values or {}).items()}
 
 
@@ -131,10 +131,10 @@ def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
     """List of values, converted from NumPy. A single value, or none, raises BusplanError."""
     plain_values = from_numpy(values)
     if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
-        raise BusplanError(f"{name} {values!r}: expected several values, as a list")
+        raise ArgumentError(f"{name} {values!r}: expected several values, as a list")
     python_values = [from_numpy(value) for value in plain_values]
     if not python_values:
-        raise BusplanError(f"{name}: no values; give at least one")
+        raise ArgumentError(f"{name}: no values; give at least one")
     return python_values
 
 
@@ -155,7 +155,7 @@ def checked_models(timing_model: Models | None, network: Network) -> tuple[str, 
     models = one_or_several(timing_model, name="timing_model")
     names = [model.name for model in network.bus.timing_models]
     if len(set(map(str, models))) != len(models) or not set(map(str, models)) <= set(names):
-        raise BusplanError(
+        raise ArgumentError(
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
     return tuple(checked_model(network, model, name="timing_model") for model in models)
@@ -169,10 +169,10 @@ def checked_model(network: Network, model: str, *, name: str) -> str:
     bus = network.bus
     names = [model.name for model in bus.timing_models]
     if model not in names:
-        raise BusplanError(f"{name} {model}: no timing model of bus.kind {bus.kind}; there are {', '.join(names)}")
+        raise ArgumentError(f"{name} {model}: no timing model of bus.kind {bus.kind}; there are {', '.join(names)}")
     keys = bus.cannot_express(network, model=model)
     if keys:
-        raise BusplanError(
+        raise ArgumentError(
             f"{name} {model}: not applicable, the {model} model has no {', '.join(keys)}; use {bus.deciding_model}"
         )
     return model
@@ -183,7 +183,7 @@ def finite(value: object, *, name: str) -> float:
     number = from_numpy(value)
     # The range is checked first, because float() of a huge int would raise OverflowError.
     if type(number) not in (int, float) or not -MOST_FLOAT <= number <= MOST_FLOAT:
-        raise BusplanError(f"{name} {number!r}: expected a finite number")
+        raise ArgumentError(f"{name} {number!r}: expected a finite number")
     return float(number)
 
 
@@ -191,7 +191,7 @@ def whole_number(value: object, *, name: str) -> int:
     """A whole number from 1 to the largest count in a profile. Anything else raises BusplanError."""
     number = from_numpy(value)
     if type(number) is not int or not 1 <= number <= MAX_COUNT:
-        raise BusplanError(f"{name} {number!r}: expected a whole number from 1 to {MAX_COUNT:,}")
+        raise ArgumentError(f"{name} {number!r}: expected a whole number from 1 to {MAX_COUNT:,}")
     return number
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, Protocol
 from busplan.buses.limits import MeasuredLatencies, PacketTime
 from busplan.buses.network import Network
 from busplan.english import plural
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.profile.document import read_bytes
@@ -403,7 +403,7 @@ def _nodes(profile: Profile, group: str | None) -> ProfileGroup:
     known = f"the groups {', '.join(by_name)}" if profile.group else "no groups"
     if group is None:
         raise BusplanError(f"{profile.name} has {known}; give the group that was measured")
-    raise BusplanError(f"group {group}: {profile.name} has {known}")
+    raise ArgumentError(f"group {group}: {profile.name} has {known}")
 
 
 def _latencies_of(network: Network) -> MeasuredLatencies:

@@ -9,7 +9,7 @@ from busplan.buses import kind_called, kind_named, kind_names, variant_called
 from busplan.buses.network import Network
 from busplan.buses.published import Tested, parts_tested
 from busplan.english import did_you_mean
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report, Sentence
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
@@ -24,7 +24,14 @@ from busplan.questions.base.arguments import (
 from busplan.questions.base.sentences import execution_sentence
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.cure import SettingForPeriod, best_register, settings_to_be_carried
-from busplan.questions.fit.figures import CycleFigures, FitFigures, after_reset, cycle_figures, words_behind
+from busplan.questions.fit.figures import (
+    CycleFigures,
+    FitFigures,
+    after_reset,
+    axes_in_all,
+    cycle_figures,
+    words_behind,
+)
 from busplan.questions.fit.graded import assumed_rates, given
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.needs import SmallestPeriod, smallest_period
@@ -211,7 +218,7 @@ def compare(
     for name in names:
         if name not in kinds:
             near = did_you_mean(name, kinds)
-            raise BusplanError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
+            raise ArgumentError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
     # A variant that the profile has anyway is its own kind.
     title = variant_called(network.bus.title_of(network))
     is_own = {name for name in network.bus.starter.variants if name == title}
@@ -318,9 +325,8 @@ def _safe_axes(network: Network) -> SafeAxes:
     profile = network.profile
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(network, group=varied.name)
-    node_axes = int(varied.node.axes)
-    beside = sum(int(group.nodes) * int(group.node.axes) for group in profile.node_groups if group.name != varied.name)
-    axes = None if not node_axes else beside + nodes * node_axes if nodes else 0
+    counted, safe = (int(number * varied.node.axes) for number in (varied.nodes, nodes))
+    axes = axes_in_all(int(network.axes), counted=counted, safe=safe)
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
 

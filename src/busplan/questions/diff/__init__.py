@@ -10,7 +10,7 @@ from busplan.buses import figure as register
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.buses.network import Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report
 from busplan.profile.kinds import KeyValue, dotted_keys
 from busplan.profile.sources import load_revision
@@ -116,7 +116,7 @@ class DiffAnswer(Answer):
         """
         allowed = finite(tolerance_percent, name="tolerance_percent")
         if allowed < 0:
-            raise BusplanError(f"tolerance_percent {allowed:g}: must be 0 or more")
+            raise ArgumentError(f"tolerance_percent {allowed:g}: must be 0 or more")
         return tuple(figure for figure in self.figures if figure.is_regression(tolerance=allowed / 100))
 
     def regression_words(self, *, tolerance_percent: float = 0.0) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from busplan.buses import kind_named, kind_names
 from busplan.buses.figure import Figure
 from busplan.english import listed, plural
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Record, Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import (
@@ -126,7 +126,7 @@ def explain(
             network.profile,
             assumptions=assumptions(network),
             figures=tuple(explained_figures(network)),
-            equations=tuple(equation_rows()),
+            equations=tuple(equation_rows(network.bus)),
             constants=tuple(constant_rows(network.bus)),
         )
     if not isinstance(figure, str):
@@ -135,7 +135,7 @@ def explain(
     labels = latency_names(network)
     for name in transactions or ():
         if name not in labels:
-            raise BusplanError(f"transaction {name!r}: expected {listed([*map(repr, labels)], 'or')}")
+            raise ArgumentError(f"transaction {name!r}: expected {listed([*map(repr, labels)], 'or')}")
     derivations = derive(
         at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us")),
         figure,

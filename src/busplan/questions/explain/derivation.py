@@ -1,7 +1,7 @@
 """Derive the figures of a bus: the equations run once more, with numbers that record how they were computed."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import product
@@ -356,8 +356,10 @@ def assumptions(network: Network) -> tuple[Input, ...]:
     return tuple(sorted((given for given in by_name.values() if rank(given) < len(GRADES)), key=rank))
 
 
-def equation_rows() -> list[Record]:
-    """One row for each equation: numbers, formula, function and source."""
+def equation_rows(bus: Bus) -> list[Record]:
+    """One row for each equation of a kind, or of all kinds: numbers, formula, function and source."""
+    # Other kinds may have been loaded, too.
+    packages = [_package(type(bus)), _package(Bus)]
     return [
         {
             "reference": equation.reference,
@@ -366,7 +368,13 @@ def equation_rows() -> list[Record]:
             "source": equation.source,
         }
         for name, equation in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
+        if _package(equation.function) in packages
     ]
+
+
+def _package(function: Callable[..., object]) -> str:
+    """Package of the module with a function or a class."""
+    return function.__module__.rpartition(".")[0]
 
 
 def constant_rows(bus: Bus) -> list[Record]:

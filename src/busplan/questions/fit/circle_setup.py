@@ -50,9 +50,8 @@ def loop_delays_us(network: Network) -> tuple[float, float]:
     if network.profile.servo.loop == "node":
         return 0.0, 0.0
     cycle = deciding_cycle(network)
-    at_sync = network.profile.servo.update == "next_sync"
-    whole_us = cycle.loop_periods(at_sync=at_sync) * network.profile.cycle.period_us
-    if at_sync:
+    whole_us = cycle.loop_periods(at_sync=cycle.takes_at_sync) * network.profile.cycle.period_us
+    if cycle.takes_at_sync:
         return whole_us, whole_us
     since_us = whole_us - cycle.sampled_us()
     first_us, last_us = _command_effects_us(cycle)

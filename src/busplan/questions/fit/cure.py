@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, Self, TypeAlias
 from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
 from busplan.elementwise import FIT_ROUNDING
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.questions.fit.figures import FitFigures
 from busplan.questions.fit.graded import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.needs import (
@@ -219,7 +219,7 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
         if any(map(freedom.is_meant, names)) and freedom not in still
     ]
     if problems:
-        raise BusplanError(*problems)
+        raise ArgumentError(*problems)
     return tuple(freedom for freedom in still if any(map(freedom.is_meant, names)))
 
 
@@ -431,7 +431,7 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
             if of_group > 0
         )
         instead = f"say {ways}" if ways else "set the nodes of a group instead"
-        raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
+        raise ArgumentError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
     (group,) = profile.node_groups
     return ceil(axes / int(group.node.axes))
 

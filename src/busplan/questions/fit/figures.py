@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import repeat
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.figure import BusFigures, OwnFigures
+from busplan.buses.figure import BusFigures, OwnFigures, Sort
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
@@ -178,10 +178,8 @@ class CapacityFigures(CycleFigures):
 
         None without axes, and under a model that does not decide.
         """
-        most = max(self.counts, key=lambda count: count.axes)
-        if not most.axes or most.safe_axes is None:
-            return None
-        return most.safe_axes and most.safe_axes + sum(count.axes for count in self.counts if count is not most)
+        counted = max(self.counts, key=lambda count: count.axes)
+        return axes_in_all(self.axes, counted=counted.axes, safe=counted.safe_axes)
 
     @property
     def of_groups(self) -> dict[str, Any]:
@@ -191,6 +189,16 @@ class CapacityFigures(CycleFigures):
     def values(self) -> dict[str, Any]:
         """All figures by key, those of groups by their dotted keys."""
         return {**super().values(), **self.of_groups}
+
+
+def axes_in_all(axes: int, *, counted: int, safe: int | None) -> int | None:
+    """The most axes of a network of `axes`, of which one group has `counted` and at most `safe` of it are shown to fit.
+
+    None without axes, and under a model that does not decide.
+    """
+    if not counted or safe is None:
+        return None
+    return safe and axes - counted + safe
 
 
 class Judged:
@@ -346,7 +354,6 @@ class FitNumbers(NamedTuple):
         """The figures, of plain numbers."""
         exceeded = tuple(key for key, is_broken in self.broken.items() if is_broken)
         not_shown = tuple(key for key, code in self.codes.items() if code == NOT_SHOWN_KEPT)
-        numbers = _plain_or_none(self.numbers)
         shared = {
             "kind": self.kind,
             "bus_figures": self.bus_figures,
@@ -357,9 +364,8 @@ class FitNumbers(NamedTuple):
             "not_shown": not_shown if self.decides else None,
             "verdict": VERDICTS[int(verdict_code(self.codes))] if self.decides else None,
             "safe": not self.unsafe,
-            "own": self.record(**_plain_or_none(self.own)),
-            **numbers,
-            **{key: int(numbers[key]) for key in ("nodes", "axes")},
+            "own": self.record(**_plain(self.own, self.bus_figures)),
+            **_plain(self.numbers, self.bus_figures),
         }
         if not self.terms:
             return FitFigures(**shared)
@@ -403,9 +409,21 @@ def fit_numbers(network: Network, *, model: str) -> FitNumbers:
     )
 
 
-def _plain_or_none(numbers: Mapping[str, Number | None]) -> dict[str, Any]:
-    """The numbers as plain ones; None for an infinite one, which does not exist."""
-    return {key: None if number is None else existing(number) for key, number in numbers.items()}
+def _plain(numbers: Mapping[str, Number | None], register: BusFigures) -> dict[str, Any]:
+    """The numbers as plain ones, of the type that each figure has; None for an infinite one, which does not exist."""
+    types = _types(register)
+    plain = {key: None if number is None else existing(number) for key, number in numbers.items()}
+    return {key: None if number is None else types.get(key, float)(number) for key, number in plain.items()}
+
+
+TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
+"""Type of the plain number of a figure, by its sort."""
+
+
+@cache
+def _types(register: BusFigures) -> Mapping[str, type]:
+    """Type of each number of `capacity` by its key."""
+    return {figure.key: TYPES[figure.sort] for figure in register.capacity if figure.sort in TYPES}
 
 
 _CERTAINTY_KEYS: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_min_period_us")

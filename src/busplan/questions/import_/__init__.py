@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms import blocks
 from busplan.profile.document import decode, validate
 from busplan.profile.edit import short_text
@@ -179,12 +179,12 @@ def _require_files(readings: Sequence[Reading], *, bus: str | None, channel: str
     described = [reading.file for reading in readings if reading.nodes and reading.kind == "can"]
     if has_nodes and len(described) != 1:
         found = f"{described[0]} and {described[1]} are both" if described else "none of the files is"
-        raise BusplanError(f"nodes: {found} an EDS; --nodes needs exactly one")
+        raise ArgumentError(f"nodes: {found} an EDS; --nodes needs exactly one")
     logs = [reading.file for reading in readings if reading.is_log]
     if channel is not None and not logs:
-        raise BusplanError(f"channel {channel}: none of the files is a CAN log")
+        raise ArgumentError(f"channel {channel}: none of the files is a CAN log")
     if bus is not None and not any(reading.is_database for reading in readings):
-        raise BusplanError(f"bus {bus}: none of the files is a database of messages")
+        raise ArgumentError(f"bus {bus}: none of the files is a database of messages")
     if len(logs) > 1:
         raise BusplanError(f"{logs[0]} and {logs[1]} are both logs; give the longer one")
 

@@ -6,7 +6,7 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.english import first_of
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.questions.import_.reading import ControlWords, Facts, Reading, assumed
 
 _SECTION: Final = re.compile(r"\s*\[([^\]\n]{1,100})\]\s*$")
@@ -74,7 +74,7 @@ def node_ids(nodes: str | int | Iterable[int]) -> tuple[int, ...]:
         str(nodes)[:40],
         f"a number of nodes, as 8, or node-IDs from 1 to {_MOST_NODE}, each once, as 1-8,11",
     )
-    refusal = BusplanError(f"nodes {shown}: expected {wanted}")
+    refusal = ArgumentError(f"nodes {shown}: expected {wanted}")
     if isinstance(nodes, str):
         if not re.fullmatch(r"\s*\d{1,3}(?:\s*[-,]\s*\d{1,3})*\s*", nodes):
             raise refusal

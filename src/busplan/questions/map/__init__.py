@@ -15,7 +15,7 @@ from busplan.buses.figure import BusFigures
 from busplan.buses.limits import Safety, Value
 from busplan.buses.network import Network
 from busplan.elementwise import FIT_ROUNDING
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.scale import round_numbers
 from busplan.profile.edit import whole
@@ -324,13 +324,13 @@ def directions(network: Network, x: Along | None, y: Along | None, *, with_circl
 def direction(profile: Profile, along: Along, *, name: str, with_circle: bool) -> Direction:
     """Check the key of a direction and the number of its values; values that the schema refuses are not drawn later."""
     if not isinstance(along, Mapping) or len(along) != 1 or not all(isinstance(key, str) for key in along):
-        raise BusplanError(f'{name} {along!r}: expected one key and its values, as {{"bus.nodes": range(1, 17)}}')
+        raise ArgumentError(f'{name} {along!r}: expected one key and its values, as {{"bus.nodes": range(1, 17)}}')
     ((key, given),) = along.items()
     values = axis_values(profile, key, given, name=name)
     if key != AXES:
         require_keys(profile, [key], option=name, circle_option=None if with_circle else "circle")
     if values.size > MOST_VALUES:
-        raise BusplanError(
+        raise ArgumentError(
             f"{name} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
     numbers = [whole(value) for value in values.tolist()]

@@ -7,7 +7,7 @@ from typing import Any
 
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.profile.changes import KeyChange, KeyChanges
@@ -211,7 +211,7 @@ def plan(
     if nodes is not None or axes is not None:
         require_cycle(loaded, question=f"a plan for {'nodes' if axes is None else 'axes'}")
     if nodes is not None and axes is not None:
-        raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
+        raise ArgumentError(f"nodes {nodes} and axes {axes}: give one of them")
     given = {
         "bus.nodes": nodes,
         "cycle.period_us": None if period_us is None else finite(period_us, name="period_us"),

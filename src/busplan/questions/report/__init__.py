@@ -7,7 +7,7 @@ from typing import Final
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, PERIOD, SAFE_AXES, UNCERTAINTY, UTILISATION, VERDICT
 from busplan.english import has_controls, plural
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import (
     Block,
     Card,
@@ -236,7 +236,7 @@ def report(
     ('<!DOCTYPE html>', 52)
     """
     if title is not None and (not isinstance(title, str) or has_controls(title) or not title.strip()):
-        raise BusplanError(f"title {title!r}: expected words in one line, without control characters")
+        raise ArgumentError(f"title {title!r}: expected words in one line, without control characters")
     # A profile is iterable, too: over its sections.
     given = [profiles] if isinstance(profiles, Profile) else one_or_several(profiles, name="profiles")
     loaded = [load_profile(profile) for profile in given]

@@ -20,7 +20,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import VERDICTS, verdict_code
-from busplan.questions.fit.figures import COUNTS, fit_numbers
+from busplan.questions.fit.figures import COUNTS, TYPES, fit_numbers
 from busplan.questions.fit.grid import Array, Grid
 from busplan.questions.fit.most_nodes import MostNodes, most_and_safe_nodes
 from busplan.questions.fit.network import network_of
@@ -37,7 +37,6 @@ Columns = dict[str, Array]
 
 Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
 """
-_TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
 
 class Sweep(NamedTuple):
@@ -200,7 +199,7 @@ def _number(number: Number | None, sort: Sort) -> Array:
     """Array of the type that the sort of a figure has; NaN for what does not exist."""
     if number is None:
         return _NO_NUMBER
-    array: Array = np.asarray(number, dtype=_TYPES[sort])
+    array: Array = np.asarray(number, dtype=TYPES[sort])
     return np.where(np.isinf(array), np.nan, array) if sort == "number" else array
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
 from busplan.english import listed
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.profile.changes import without_units
 from busplan.profile.document import override
 from busplan.profile.edit import whole
@@ -47,7 +47,7 @@ def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bo
     override(profile, {key: words[0] if words else max(numbers) for key, (numbers, words) in parts.items()})
     grid = Grid(dict(axes))
     if grid.points > MOST_POINTS:
-        raise BusplanError(f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} a sweep takes; vary less")
+        raise ArgumentError(f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} a sweep takes; vary less")
     return grid
 
 
@@ -61,14 +61,14 @@ def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_o
     for key in keys:
         of_groups = [f"group.{group.name}.{key.partition('.')[2]}" for group in profile.group]
         if key not in read and set(of_groups) <= {*read} and of_groups:
-            raise BusplanError(
+            raise ArgumentError(
                 f"{option} {key}: each group of {profile.name} has its own; give {listed(of_groups, 'or')}"
             )
         _require_known(profile, key, name=f"{option} {key}")
         is_of_circle = key.partition(".")[0] in CIRCLE_SECTIONS
         if key not in read and not (is_of_circle and circle_option is None):
             more = f"; add {circle_option} to run circle tests" if is_of_circle else ""
-            raise BusplanError(f"{option} {key}: no figure of capacity depends on it{more}")
+            raise ArgumentError(f"{option} {key}: no figure of capacity depends on it{more}")
 
 
 def grid_models(network: Network, grid: Grid, models: Sequence[str] | None) -> tuple[str, ...]:
@@ -89,12 +89,15 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
     """Refuse a key that does not exist, or that is a section or a list."""
     keys = dotted_keys(profile)
     if any(other.startswith(f"{key}.") for other in keys):
-        raise BusplanError(f"{name}: is a section; expected the key of one number")
+        raise ArgumentError(f"{name}: is a section; expected the key of one number")
     if key not in keys:
-        override(profile, {key: 1}, origin={key: name})  # says what was meant
-        raise BusplanError(f"{name}: no such key of this profile")
+        try:
+            override(profile, {key: 1}, origin={key: name})  # says what was meant
+        except BusplanError as error:
+            raise ArgumentError(*error.problems) from None
+        raise ArgumentError(f"{name}: no such key of this profile")
     if isinstance(keys[key].value, list | tuple):
-        raise BusplanError(f"{name}: is a list; expected the key of one number")
+        raise ArgumentError(f"{name}: is a list; expected the key of one number")
 
 
 def _samples(axis: Array) -> list[Value]:
@@ -146,7 +149,7 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
     if isinstance(given, str):
         return _parsed(without_units(given, key=key), name=f"{name} {key}={given}", words=words)
     if isinstance(given, range) and given[MOST_POINTS:]:
-        raise BusplanError(f"{name} {key}: more values than the {MOST_POINTS:,} points a sweep takes; vary less")
+        raise ArgumentError(f"{name} {key}: more values than the {MOST_POINTS:,} points a sweep takes; vary less")
     return _listed(items(given, name=f"{name} {key}"), name=f"{name} {key}", words=words)
 
 
@@ -167,12 +170,12 @@ def _listed(values: Iterable[object], *, name: str, words: Collection[str]) -> A
         value = _TRUTHS.get(given, given) if isinstance(given, str) and given in words else given
         if not _is_value(value, words):
             more = f" and none of {', '.join(words)}" if words else ""
-            raise BusplanError(f"{name}: {value!r} is not a finite number{more}")
+            raise ArgumentError(f"{name}: {value!r} is not a finite number{more}")
         if value in unique:
-            raise BusplanError(f"{name}: {value} is given twice")
+            raise ArgumentError(f"{name}: {value} is given twice")
         unique[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
     if not unique:
-        raise BusplanError(f"{name}: no values; give at least one")
+        raise ArgumentError(f"{name}: no values; give at least one")
     return _axis_of([*unique])
 
 
@@ -201,7 +204,7 @@ def _axis_of(values: Sequence[Value]) -> Array:
 def _range(name: str, text: str) -> Array:
     parts = [part.strip() for part in text.split(":")]
     if len(parts) not in {2, 3}:
-        raise BusplanError(f"{name}: {_FORMS}")
+        raise ArgumentError(f"{name}: {_FORMS}")
     first, last = (_number(name, part) for part in parts[:2])
     third = parts[2] if len(parts) > 2 else "1"  # noqa: PLR2004
     if third.startswith("*"):
@@ -210,7 +213,7 @@ def _range(name: str, text: str) -> Array:
         return _even(name, first, last, third[1:].strip())
     step = _number(name, third)
     if step == 0 or (last - first) * step < 0:
-        raise BusplanError(f"{name}: steps of {third} never lead from {parts[0]} to {parts[1]}")
+        raise ArgumentError(f"{name}: steps of {third} never lead from {parts[0]} to {parts[1]}")
     with localcontext(prec=100):
         return _steps(name, first, step, int((last - first) // step) + 1)
 
@@ -221,7 +224,7 @@ def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Array:
     decimals = max(0, *(-int(number.normalize().as_tuple().exponent) for number in (first, step)))
     start, stride = (int(number.scaleb(decimals)) for number in (first, step))
     if decimals > _MAX_DECIMALS or max(abs(start), abs(start + stride * size)) >= _EXACT:
-        raise BusplanError(f"{name}: more digits than a number here can hold; use A:B:#COUNT")
+        raise ArgumentError(f"{name}: more digits than a number here can hold; use A:B:#COUNT")
     whole = start + stride * _numbered(name, size)
     return whole / float(10**decimals) if decimals else whole
 
@@ -229,28 +232,29 @@ def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Array:
 def _numbered(name: str, size: int) -> Array:
     """Whole numbers from 0, one for each value."""
     if size > MOST_POINTS:
-        raise BusplanError(f"{name}: {size:,} values are more than the {MOST_POINTS:,} points a sweep takes; vary less")
+        most = f"the {MOST_POINTS:,} points a sweep takes"
+        raise ArgumentError(f"{name}: {size:,} values are more than {most}; vary less")
     return np.arange(size)
 
 
 def _geometric(name: str, first: Decimal, last: Decimal, factor: Decimal) -> Array:
     if factor <= 0 or factor == 1 or first <= 0 or last <= 0 or (last - first) * (factor - 1) < 0:
-        raise BusplanError(f"{name}: multiplying by {factor} never leads from {first} to {last}")
+        raise ArgumentError(f"{name}: multiplying by {factor} never leads from {first} to {last}")
     values: list[int | float] = []
     with localcontext(prec=50):
         while (last - first) * (factor - 1) >= 0:
             values.append(_plain(first))
             if len(values) > _MOST_LISTED:
-                raise BusplanError(f"{name}: more than {_MOST_LISTED:,} values; take a larger factor")
+                raise ArgumentError(f"{name}: more than {_MOST_LISTED:,} values; take a larger factor")
             first *= factor
     return _axis_of(values)
 
 
 def _even(name: str, first: Decimal, last: Decimal, count: str) -> Array:
     if not re.fullmatch(r"[0-9]{1,12}", count) or int(count) < 2:  # noqa: PLR2004
-        raise BusplanError(f"{name}: expected a count of 2 or more after the #")
+        raise ArgumentError(f"{name}: expected a count of 2 or more after the #")
     if first == last:
-        raise BusplanError(f"{name}: {count} values from {first} to {last} are one")
+        raise ArgumentError(f"{name}: {count} values from {first} to {last} are one")
     step = (last - first) / (int(count) - 1)
     if all(number == number.to_integral_value() for number in (first, step)):
         return _steps(name, first, step, int(count))
@@ -261,7 +265,7 @@ def _even(name: str, first: Decimal, last: Decimal, count: str) -> Array:
 def _number(name: str, part: str, words: Collection[str] = ()) -> Decimal:
     if not _NUMBER.fullmatch(part):
         more = f" and none of {', '.join(words)}" if words else ""
-        raise BusplanError(f"{name}: {part!r} is not a number{more}; {_FORMS}")
+        raise ArgumentError(f"{name}: {part!r} is not a number{more}; {_FORMS}")
     return Decimal(part)
 
 

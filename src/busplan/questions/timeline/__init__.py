@@ -4,7 +4,7 @@ import re
 from typing import Final
 
 from busplan.buses.network import Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import (
@@ -107,10 +107,10 @@ def _transaction(given: object, network: Network) -> tuple[str, int]:
             node = whole_number(number, name="transaction")
             text = f"{kind}:{node}"
         case _:
-            raise BusplanError(f'transaction {given!r}: expected one of one node, as ("read", 1)')
+            raise ArgumentError(f'transaction {given!r}: expected one of one node, as ("read", 1)')
     kinds, nodes = [kind.key for kind in network.bus.stretch_kinds], int(network.nodes)
     if kind in kinds and 1 <= node <= nodes:
         return kind, node
     expected = f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"
     example = f", as {kinds[0]}:1 or {kinds[-1]}:{nodes}" if kinds else ""
-    raise BusplanError(f"transaction {text}: expected {expected}{example}")
+    raise ArgumentError(f"transaction {text}: expected {expected}{example}")
