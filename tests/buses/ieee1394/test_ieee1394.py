@@ -111,3 +111,11 @@ def test_equation_2_sums_all_that_the_cycle_needs(name: str, model: str, changes
     parts_us = figures["reads_us"] + figures["writes_us"] + 17.0 + figures["sync_us"] + beside_us
     assert figures["required_time_slice_us"] * figures["nodes"] == pytest.approx(parts_us, rel=1e-13)
     assert parts_us == pytest.approx(figures["required_us"], rel=1e-13)
+
+
+def test_a_gap_count_has_no_relative_change_and_other_numbers_have_one() -> None:
+    plan = busplan.load_profile("paper-1ms", changes={"bus.gap_count": 7, "bus.max_hops": 3})
+    for one in busplan.diff("paper-1ms", plan).figures:
+        if one.difference is not None and one.a:
+            relative = None if one.figure.key in ("gap_count", "safe_gap_count") else one.difference / one.a
+            assert one.relative_difference == relative, one.figure.key
