@@ -73,3 +73,10 @@ def test_a_small_change_costs_time_and_one_that_is_not_offered_costs_none(profil
         else:
             assert changed != profile, small
             assert more_us < 0 if small.label == "16 Mbit/s" else more_us >= 0, small
+
+
+@PROFILES
+def test_payloads_are_whole_bytes_words_of_sercos_or_quadlets_of_ieee_1394(profile: busplan.Profile) -> None:
+    network = network_of(profile)
+    quadlets, words = {"ieee1394": 4}, {"sercos2": 2, "sercos3": 2}
+    assert network.bus.payloads(network).step_bytes == (quadlets | words).get(profile.bus.kind, 1)

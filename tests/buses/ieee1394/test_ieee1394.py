@@ -141,7 +141,11 @@ def test_only_broadcasts_are_collected_in_blocks() -> None:
         ("paper-1ms", {"bus.nodes": 17}, ("BP107", "bus.nodes")),
         ("paper-1ms", {"bus.nodes": 63, "bus.max_hops": 6}, ("BP106", "bus.nodes")),
         ("gantry-24", {"group.drives.nodes": 17}, ("BP107", "group.io.nodes")),
-        ("gantry-24", {"group.drives.nodes": 63, "bus.max_hops": 6, "bus.charge_hops": "farthest"}, ("BP106", "group.io.nodes")),
+        (
+            "gantry-24",
+            {"group.drives.nodes": 63, "bus.max_hops": 6, "bus.charge_hops": "farthest"},
+            ("BP106", "group.io.nodes"),
+        ),
         ("paper-1ms", {"bus.max_hops": 17}, ("BP107", "bus.max_hops")),
     ],
 )
@@ -149,7 +153,9 @@ def test_what_is_too_many_is_said_at_the_key_of_the_last_nodes(
     name: str, changes: dict[str, object], expected: tuple[str, str]
 ) -> None:
     found = busplan.check(busplan.load_profile(name, changes=changes), circle=False).findings
-    assert [(one.finding.code, one.finding.key) for one in found if one.finding.code in ("BP106", "BP107")] == [expected]
+    assert [(one.finding.code, one.finding.key) for one in found if one.finding.code in ("BP106", "BP107")] == [
+        expected
+    ]
 
 
 @pytest.mark.parametrize("nodes", [2, 6])
