@@ -1,4 +1,7 @@
-"""Facts about keys belong to keys that profiles of the kind have."""
+"""Facts about keys belong to keys that profiles of the kind have; and no number of a bus is negative."""
+
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from pydantic import BaseModel
@@ -19,3 +22,25 @@ def test_every_key_is_one_of_the_profile(kind: str) -> None:
     assert [key for key in bus.keys if not has([bus.profile_model()], key)] == []
     roles = [key.role for key in bus.keys.values() if key.role]
     assert len(roles) == len(set(roles))
+
+
+def numbers(schema: dict[str, Any], key: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Schema of each number that a key may take, alone or in a list or table."""
+    if schema.get("type") in ("number", "integer") and not {"enum", "const"} & schema.keys():
+        yield key, schema
+    for inner in ("items", "additionalProperties"):
+        if isinstance(schema.get(inner), dict):
+            yield from numbers(schema[inner], key)
+    for one in schema.get("anyOf", ()):
+        yield from numbers(one, key)
+    for name, one in schema.get("properties", {}).items():
+        yield from numbers(one, f"{key}.{name}")
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_no_number_of_a_bus_is_negative(kind: str) -> None:
+    sections = kind_named(kind).profile_model().model_json_schema()["$defs"]
+    of_circle = ("AxisOverride", "DeliverySection", "MechanicsSection", "ServoSection")
+    found = [pair for name, one in sections.items() if name not in of_circle for pair in numbers(one, name)]
+    assert len(found) > 20
+    assert [key for key, one in found if one.get("minimum", one.get("exclusiveMinimum", -1)) < 0] == []

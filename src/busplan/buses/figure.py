@@ -106,15 +106,15 @@ def unit_of(key: str) -> str:
 
 
 def by(*functions: Callable[..., object]) -> str:
-    """Numbers of the equations that some functions compute.
+    """Numbers of the equations that some functions compute, ascending.
 
     Examples
     --------
-    >>> by(time_slice.time_slice_us, time_slice.required_time_slice_us)
+    >>> by(time_slice.required_time_slice_us, time_slice.time_slice_us)
     '(1) (2)'
     """
-    numbers = dict.fromkeys(number for function in functions for number in EQUATIONS[function.__name__].numbers)
-    return " ".join(f"({number})" for number in numbers)
+    numbers = {number for function in functions for number in EQUATIONS[function.__name__].numbers}
+    return " ".join(f"({number})" for number in sorted(numbers))
 
 
 def by_key(figures: Iterable[Figure]) -> dict[str, Figure]:

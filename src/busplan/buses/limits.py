@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, unique
 from functools import reduce
 from math import inf
 from typing import Final, Literal, NamedTuple
@@ -334,6 +334,7 @@ per_byte_us = 0.1          # assumed: time per byte
         return "\n".join(filter(None, (bus, self.hosts.get(host or self.host), more)))
 
 
+@unique
 class Cost(IntEnum):
     """Cost of a change of a network, the cheapest first: the order of plans, of advice and of cures."""
 

@@ -241,6 +241,33 @@ def test_both_forms_give_the_same_floats(seed: int) -> None:
     assert first == second
 
 
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("data_bytes", [(), (2,), (0, 8), (5, 3, 1), (1, 8, 2, 4)])
+def test_a_cycle_waits_for_the_three_longest_frames_behind_it(data_bytes: tuple[int, ...], form: str) -> None:
+    behind = [
+        {"name": f"m{size}", "identifier": 0x7F0 + size, "payload_bytes": size, "period_us": 1e6, "deadline_us": 1e5}
+        for size in data_bytes
+    ]
+    first = {"name": "first", "identifier": 0x90, "payload_bytes": 0, "period_us": 1e6}
+    execution = {"kind": "linear", "base_us": 0, "per_byte_us": 0}
+    own = loaded(
+        {
+            "schema_version": 1,
+            "name": "cycle",
+            "bus": {"kind": "can", "bit_rate_kbit_s": KBIT_S, "nodes": 1},
+            "cycle": {"period_us": 5000},
+            "payload": {"read_bytes": 8, "write_bytes": 8},
+            "node": {"axes": 1, "execution": execution},
+            "message": [first, *behind],
+        }
+    )
+    with computed_by(form):
+        found = figures(own)
+    blocking_us = sum(sorted(BIT_US * (55 + 10 * size) for size in data_bytes)[-3:])
+    assert {term.name: term.us for term in found.terms}["blocking"] == blocking_us
+    assert found.required_us == BIT_US * (55 + 55 + 2 * 135) + blocking_us
+
+
 def test_a_burst_waits_for_itself_and_others_wait_for_all_of_it() -> None:
     # 270 us a frame: five at once, and behind them a message that meets one of them and one of a lower priority.
     own = network({"period_us": 100_000, "burst": 5}, {"period_us": 10_000}, {"period_us": 50_000})

@@ -332,3 +332,12 @@ def test_the_doubt_of_a_phy_is_as_large_as_the_time_that_it_moves(
     (doubt_us,) = (doubt.us for doubt in standard(kit(changes)).doubts if doubt.key == "bus.phy_delay_us")
     # 20 ns either way, none likelier than another.
     assert doubt_us == pytest.approx((after_us - before_us) / step_us * 0.02 / sqrt(3), rel=1e-6)
+
+
+@pytest.mark.parametrize("schedule", ["individual", "broadcast"])
+@pytest.mark.parametrize("gap_count", [21, 63])
+def test_both_gaps_follow_a_transaction(schedule: str, gap_count: int) -> None:
+    own = standard(kit(cycle__schedule=schedule, bus__gap_count=gap_count)).own
+    gaps_us = (82 + 48 * gap_count) / 98.304  # the paper's equation (10), by the standard's clock
+    assert own.read_latency_with_gaps_us - own.read_latency_us == pytest.approx(gaps_us)
+    assert own.write_latency_with_gaps_us - own.write_latency_us == pytest.approx(gaps_us)

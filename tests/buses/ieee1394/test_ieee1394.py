@@ -1,6 +1,6 @@
 """The standard's figures against their public sources."""
 
-from math import ceil, sqrt
+from math import ceil, fsum, sqrt
 
 import pytest
 from hypothesis import given
@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.ieee1394 import constants as ieee1394
+from busplan.questions.fit.certainty import deciding_cycle
+from busplan.questions.fit.network import network_of
 
 
 def test_gap_count_table_follows_from_cable_and_phy_delay() -> None:
@@ -111,3 +113,78 @@ def test_equation_2_sums_all_that_the_cycle_needs(name: str, model: str, changes
     parts_us = figures["reads_us"] + figures["writes_us"] + 17.0 + figures["sync_us"] + beside_us
     assert figures["required_time_slice_us"] * figures["nodes"] == pytest.approx(parts_us, rel=1e-13)
     assert parts_us == pytest.approx(figures["required_us"], rel=1e-13)
+
+
+def test_a_gap_count_has_no_relative_change_and_other_numbers_have_one() -> None:
+    plan = busplan.load_profile("paper-1ms", changes={"bus.gap_count": 7, "bus.max_hops": 3})
+    for one in busplan.diff("paper-1ms", plan).figures:
+        if one.difference is not None and one.a:
+            relative = None if one.figure.key in ("gap_count", "safe_gap_count") else one.difference / one.a
+            assert one.relative_difference == relative, one.figure.key
+
+
+def test_only_broadcasts_are_collected_in_blocks() -> None:
+    # 20 nodes of 128 bytes: a hub holds 16, and a packet of S400 2048 bytes.
+    many = {"bus.nodes": 20, "bus.max_hops": 6, "cycle.period_us": 20_000.0}
+    many |= {"payload.read_bytes": 128, "payload.write_bytes": 128}
+    for schedule, exceeded in {
+        "individual": (),
+        "broadcast": ("broadcasting nodes", "hub block", "write block"),
+    }.items():
+        plan = busplan.load_profile("paper-1ms", changes={**many, "cycle.schedule": schedule})
+        assert busplan.capacity(plan).results[0].exceeded == exceeded
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "expected"),
+    [
+        ("paper-1ms", {"bus.nodes": 17}, ("BP107", "bus.nodes")),
+        ("paper-1ms", {"bus.nodes": 63, "bus.max_hops": 6}, ("BP106", "bus.nodes")),
+        ("gantry-24", {"group.drives.nodes": 17}, ("BP107", "group.io.nodes")),
+        (
+            "gantry-24",
+            {"group.drives.nodes": 63, "bus.max_hops": 6, "bus.charge_hops": "farthest"},
+            ("BP106", "group.io.nodes"),
+        ),
+        ("paper-1ms", {"bus.max_hops": 17}, ("BP107", "bus.max_hops")),
+    ],
+)
+def test_what_is_too_many_is_said_at_the_key_of_the_last_nodes(
+    name: str, changes: dict[str, object], expected: tuple[str, str]
+) -> None:
+    found = busplan.check(busplan.load_profile(name, changes=changes), circle=False).findings
+    assert [(one.finding.code, one.finding.key) for one in found if one.finding.code in ("BP106", "BP107")] == [
+        expected
+    ]
+
+
+@pytest.mark.parametrize("nodes", [2, 6])
+def test_a_cycle_start_goes_between_the_first_rounds_that_are_due_after_it(nodes: int) -> None:
+    changes = {"bus.cycle_master": True, "bus.nodes": nodes}
+    cycle = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
+    now_us, before_us, starts = 0.0, -1.0, 0
+    for each in map(list, cycle.each_round()):
+        is_start = each[0].kind == "cycle_start"
+        due_us = 125.0 * starts
+        assert is_start or now_us < due_us or starts == cycle.number_of_starts
+        assert not is_start or now_us >= due_us > before_us
+        starts, before_us = starts + is_start, before_us if is_start else now_us
+        now_us += fsum(event.us for event in each)
+    assert starts == cycle.number_of_starts > 2
+
+
+def test_the_constant_of_equation_15_is_a_sum_of_rounded_terms() -> None:
+    (kind,) = busplan.evidence("ieee1394").kinds
+    (constant,) = (
+        row for section in kind.sections for row in section.comparisons if row.method == "terms rounded first"
+    )
+    assert constant.published == 3.11
+    assert constant.computed == pytest.approx(3.11, abs=1e-9)
+
+
+@pytest.mark.parametrize("period_us", [250.0, 540.0])
+def test_a_finding_has_the_margin_of_capacity(period_us: float) -> None:
+    plan = busplan.load_profile("paper-1ms", changes={"cycle.period_us": period_us})
+    deciding = busplan.capacity(plan).results[0]
+    margin = f"corrected margin {deciding.margin_corrected_us:.1f} +/- {deciding.uncertainty_us:.1f} us"
+    assert any(margin in one.finding.message for one in busplan.check(plan, circle=False).findings)

@@ -4,6 +4,8 @@ import pytest
 
 import busplan
 from busplan.errors import BusplanError
+from busplan.questions.fit.circle_setup import delivery_of
+from busplan.questions.fit.network import network_of
 
 CAUSES: dict[str, dict[str, object]] = {
     "circle.feed_mm_per_min": {"circle.feed_mm_per_min": 1e6},
@@ -76,3 +78,13 @@ def test_a_step_that_does_not_divide_the_period_is_the_longest_that_does() -> No
     shorter, given = (busplan.circle_test(changed({"servo.step_us": step_us})) for step_us in (300.0, 250.0))
     assert shorter.results == given.results
     assert refused_keys(changed({"servo.step_us": 300.0})) == []
+
+
+@pytest.mark.parametrize("loop", ["node", "host"])
+@pytest.mark.parametrize("has_clocks", [False, True])
+def test_nodes_with_a_common_clock_or_a_loop_on_the_host_add_no_skew(loop: str, has_clocks: bool) -> None:
+    changes = {"servo.loop": loop, "bus.distributed_clocks": has_clocks, "delivery.skew_us": 2.0}
+    network = network_of(busplan.load_profile("ethercat-servo-8", changes=changes))
+    added_us = delivery_of(network).skew_us - 2
+    # From the first node to the last there are seven cables and ports.
+    assert added_us > 7 * 0.5 if loop == "node" and not has_clocks else added_us == 0

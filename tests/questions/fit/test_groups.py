@@ -405,3 +405,23 @@ def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(
     )
     each_us = 0.020 / 3**0.5
     assert farthest.us - own.us == pytest.approx(parts * (9 - 6) * each_us, rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "group"), [("gantry-24", "drives"), ("paper-4ms", "")])
+def test_the_most_axes_are_those_of_the_largest_network_that_is_shown_to_fit(name: str, group: str) -> None:
+    # With more nodes of the group with the most axes, one by one.
+    profile = busplan.load_profile(name, changes={"cycle.period_us": 2500})
+    key = f"group.{group}.nodes" if group else "bus.nodes"
+    nodes, most = next(one.nodes for one in profile.node_groups if one.name == group), 0
+    while (found := figures(changed(profile, {key: nodes}))).verdict == "fits" and found.safe:
+        nodes, most = nodes + 1, found.axes
+    assert most > figures(profile).axes
+    assert figures(profile).most_axes == most
+
+
+def test_a_network_of_messages_has_neither_nodes_nor_axes() -> None:
+    message = {"name": "m", "identifier": 1, "payload_bytes": 8, "period_us": 10_000}
+    bus = {"kind": "can", "bit_rate_kbit_s": 500}
+    data = {"schema_version": 1, "name": "messages", "bus": bus, "message": [message]}
+    alone = figures(kind_named("can").profile_model().model_validate(data), "worst-stuffing")
+    assert (alone.nodes, alone.axes, alone.most_axes) == (0, 0, None)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -384,3 +385,17 @@ def test_apply_writes_what_was_measured_with_its_origin(run: Run, refused: Refus
     assert "master_uncertainty_us" not in newest
     assert "shipped profile" in refused("measured", "ethercat-servo-8", words[2], "--apply")
     assert "--set bus.master_us=1" in refused(*words, "--apply", "--set", "bus.master_us=1", cwd=tmp_path)
+
+
+def test_packets_of_others_and_packets_without_a_time_are_counted_together(tmp_path: Path) -> None:
+    other = b"\xff" * 12 + b"\x08\x00" + bytes(46)
+    packets = simulated(Machine(devices=4), 60)
+    content = pcapng([*packets, *((packets[-1][0], other) for _ in range(3))])
+    # A simple packet block has no stamp.
+    without_time = struct.pack("<3I", 3, 16 + len(other), len(other)) + other + struct.pack("<I", 16 + len(other))
+    path = tmp_path / "capture.pcapng"
+    path.write_bytes(content + 2 * without_time)
+    assert (
+        "Left out: 5 packets of other protocols or interfaces, or without a time."
+        in busplan.measured(PLAN, path).remarks
+    )

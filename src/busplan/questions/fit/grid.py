@@ -128,7 +128,7 @@ def _nodes_with(axes: object, network: Network, *, nodes_key: str) -> int:
     node_axes = int(varied.node.axes)
     other_axes = int(network.axes) - int(varied.nodes) * node_axes
     varied_axes = axes - other_axes if isinstance(axes, int) else 0
-    if varied_axes < max(node_axes, 1) or not node_axes or varied_axes % node_axes:
+    if varied_axes < node_axes or not node_axes or varied_axes % node_axes:
         beside = f" beside {other_axes} others" if other_axes else ""
         raise BusplanError(f"axes = {axes}: no whole number of nodes, with {node_axes} axes each{beside}")
     return varied_axes // node_axes
