@@ -118,6 +118,11 @@ def test_a_cut_file_says_where(tmp_path: Path) -> None:
     assert broken_at(measured(content[:-10], tmp_path)) == len(content) - size
     assert recorded(content[:-10], tmp_path) == recorded(content[:-size], tmp_path)
     assert broken_at(measured(content, tmp_path)) is None
+    # A record of pcap has 16 bytes before its packet.
+    content, size = pcap(PACKETS), 16 + len(PACKETS[-1][1])
+    assert broken_at(measured(content[:-10], tmp_path)) == len(content) - size
+    assert recorded(content[:-10], tmp_path) == recorded(content[:-size], tmp_path)
+    assert broken_at(measured(content, tmp_path)) is None
 
 
 def test_an_interface_that_is_no_ethernet_is_left_out(tmp_path: Path) -> None:
