@@ -115,6 +115,13 @@ def test_comments_inside_arrays_are_seen(changed: Changed, check: Check) -> None
     assert said(check(text)) == [("BP902", 24, 19)]
 
 
+def test_one_behind_the_end_of_an_array_is_not_alone_on_its_line(changed: Changed, check: Check) -> None:
+    table = 'kind = "table"\ngrade = "measured"\npayload_bytes = [4,\n16\n] # busplan: ignore[BP110] why\ntime_us = [1, 2]'
+    result = check(changed(('kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35', table)))
+    assert said(result) == [("BP902", 26, 3)]
+    assert "BP110 has nothing to suppress on line 26" in result.findings[0].message
+
+
 def test_the_shape_of_the_file_cannot_be_suppressed(changed: Changed, check: Check) -> None:
     result = check(changed(("nodes = 2", "nodes = 0  # busplan: ignore[BP005] why not")))
     assert said(result) == [("BP005", 8, 1)]

@@ -12,7 +12,7 @@ import busplan
 from busplan import BusplanError, Profile
 from busplan.buses import kind_names
 from busplan.english import listed
-from busplan.profile.changes import KeyChange, KeyChanges, parse_set
+from busplan.profile.changes import KeyChange, KeyChanges, parse_set, without_units
 
 KINDS = listed([f'"{one}"' for one in kind_names()], "or")
 
@@ -58,12 +58,20 @@ def test_what_is_neither_toml_nor_a_word_is_refused(written: str) -> None:
         ("bus.bit_rate_kbit_s=1Mbit/s", 1000),
         ("servo.lever_mm=20um", 0.02),
         ("bus.cable_length_m=300mm", 0.3),
+        ("bus.cable_length_m=2m", 2),
+        ("servo.lever_mm=2mm", 2),
+        ("servo.lever_mm=0.5m", 500),
+        ("bus.bit_rate_kbit_s=125kbit/s", 125),
     ],
 )
 def test_a_number_may_have_its_unit(text: str, value: float) -> None:
     (change,) = parse_set([text])
     assert (change.value, type(change.value)) == (value, type(value))
     assert f"in {change.key.rpartition('_')[2] if 'kbit' not in text else 'kbit_s'} {value:g}" in change.note
+
+
+def test_units_of_a_grid_are_those_of_its_key_and_others_stay() -> None:
+    assert without_units("0.5ms,3mm:2s,S200,7", key="cycle.period_us") == "500,3mm:2000000,S200,7"
 
 
 def test_a_unit_of_another_quantity_is_refused() -> None:
@@ -78,6 +86,9 @@ def test_a_unit_of_another_quantity_is_refused() -> None:
         ("kind=can", "unknown key; did you mean bus.kind?"),
         ("bus.period_us=250", "unknown key; did you mean cycle.period_us?"),
         ("bus.nods=3", "unknown key; did you mean nodes?"),
+        # At the top a name is that of a key below; in a section a misspelt one of its own.
+        ("nodes=3", "unknown key; did you mean bus.nodes?"),
+        ("cycle.period=250", "unknown key; did you mean period_us?"),
         ("bus.gap_count=5us", "expected a whole number from 0 to 63"),
         ("node.execution.base_us=3", 'unknown key where kind is "table"; it is a key of kind = "linear"'),
         ("bus.bit_rate_kbit_s=500", 'unknown key on this bus; it is a key where bus.kind is "can" or "polled"'),

@@ -243,6 +243,13 @@ def test_a_section_inside_an_inline_table_is_refused() -> None:
         edited(text, {"cycle.sync.ping_us": 1})
 
 
+def test_the_line_of_an_inner_section_is_none_of_the_outer_one() -> None:
+    text = PLAIN.replace('{ period_us = 4000, "sync" = { ping_us = 0.3 } } # the cycle', "{}").replace("cycle = {}\n", "")
+    text = f"cycle.period_us = 4000\n{text}\n[cycle.sync]\nping_us = 0.3\n"
+    with pytest.raises(BusplanError, match=r"there is no line \[cycle\], .*\n\[cycle\]\nslice_ratio = 0\.5$"):
+        edited(text, {"cycle.slice_ratio": 0.5})
+
+
 def test_line_ends_of_two_kinds_are_refused() -> None:
     with pytest.raises(BusplanError, match=r"CRLF.*\n# a: b\n\[bus\]\nnodes = 3"):
         edited(PLAIN.replace("# the bus\n", "# the bus\r\n"), {"bus.nodes": 3}, notes={"bus": "a: b"})
@@ -360,4 +367,25 @@ def test_an_inline_group_is_left_with_its_lines() -> None:
     )
     with pytest.raises(BusplanError) as caught:
         edited_file(f"{head}{inline}{tail}".encode(), {"group.a.execution.grade": "measured"}, name="x")
+    assert caught.value.problems[0].startswith("x: there is no line [group.execution], so that it stays as it is")
     assert caught.value.problems[1:] == ("[group.execution]  # of a", 'grade = "measured"')
+
+
+def test_a_group_without_the_section_is_left_with_its_lines() -> None:
+    group = '[[group]]\nname = "io"\nnodes = 2\naxes = 0\nread_bytes = 4\nwrite_bytes = 4\n'
+    text = f'schema_version = 1\nname = "x"\n[bus]\nkind = "ethercat"\n[cycle]\nperiod_us = 1000\n{group}'
+    changes = {"kind": "linear", "base_us": 1, "per_byte_us": 0, "grade": "measured"}
+    with pytest.raises(BusplanError) as caught:
+        edited(text, {f"group.io.execution.{key}": value for key, value in changes.items()})
+    assert caught.value.problems[0].startswith("x.toml: there is no section of a group to write to, ")
+    assert caught.value.problems[1] == "[group.execution]  # of io"
+
+
+@pytest.mark.parametrize(
+    ("of_table", "beside"), [("  # measured: by Li", "  # not measured"), ("  # assumed: a guess", ""), ("", "")]
+)
+def test_a_choice_is_not_measured_because_its_table_is(of_table: str, beside: str) -> None:
+    table = f'[node.execution]{of_table}\nkind = "linear"\nbase_us = 20\nper_byte_us = 0.1\n'
+    text = PLAIN[: PLAIN.index("  [node.execution]")] + table
+    new = edited_file(text.encode(), {"node.execution.base_us": 30}, name="x.toml", are_choices=True).decode()
+    assert new == text.replace("base_us = 20", f"base_us = 30{beside}")

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import busplan
+from busplan.profile.kinds import words_of
 
 TEXT = """\
 schema_version = 1
@@ -417,3 +418,21 @@ def test_a_payload_outside_the_table_is_refused_each_with_its_key(
 
 def test_a_linear_execution_time_knows_every_payload() -> None:
     assert profile(payload__read_bytes=1_000_000)
+
+
+def test_a_converter_of_one_bit_is_refused() -> None:
+    assert refused(servo__dac_bits=1) == ["expected 0 (ideal), or 2 to 32: one bit is a sign and no level"]
+    assert [profile(servo__dac_bits=bits).servo.dac_bits for bits in (0, 2, 32)] == [0, 2, 32]
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("bus.cycle_master", ("true", "false")),
+        ("node.read_response", ("split", "concatenated")),
+        ("bus.gap_count", ("optimal",)),
+        ("bus.nodes", ()),
+    ],
+)
+def test_words_that_a_key_takes(key: str, words: tuple[str, ...]) -> None:
+    assert words_of(smallest(), key) == words

@@ -49,6 +49,14 @@ def test_a_shipped_profile_loads_under_its_own_name() -> None:
         assert load(name).description.strip()
 
 
+def test_a_file_beside_is_meant_by_its_near_name(tmp_path: Path) -> None:
+    (tmp_path / "press.toml").touch()
+    for typed, meant in (("pres.toml", "press.toml"), ("prss", "press.toml"), ("press", "press.toml")):
+        with pytest.raises(BusplanError) as caught:
+            load(str(tmp_path / typed))
+        assert str(caught.value) == f"{tmp_path / typed}: no such file; did you mean {tmp_path / meant}?"
+
+
 def test_a_shipped_profile_explains_its_keys() -> None:
     for name in SHIPPED:
         assert text_of(name).count("#") >= 5

@@ -106,6 +106,10 @@ FAULTS = {
     "zero period": ("4000", "0", "9:1: cycle.period_us = 0: must be 0.001 or more"),
     "zero nodes": ("nodes = 2", "nodes = 0", "7:1: bus.nodes = 0: must be 1 or more"),
     "too large": ("slice_ratio = 0.5", "slice_ratio = 1.5", "10:1: cycle.slice_ratio = 1.5: must be 1 or less"),
+    "percentage": (
+        *("slice_ratio = 0.5", "slice_ratio = 85"),
+        "10:1: cycle.slice_ratio = 85: must be 1 or less; it is a share: 0.85 for 85 %",
+    ),
     "as written": ("nodes = 2", "nodes   =  0x00", "7:1: bus.nodes = 0x00: must be 1 or more"),
     "unknown speed": (
         *('"S400"', '"S500"'),
@@ -133,6 +137,7 @@ FAULTS = {
         '19:1: node.execution.kind = "cubic": expected "linear" or "table"',
     ),
     "schema version": ("schema_version = 1", "schema_version = 2", "1:1: schema_version = 2: expected 1"),
+    "schema version as a word": ("schema_version = 1", "schema_version = true", "1:1: schema_version = true: expected 1"),
     "empty name": ('"test"', '""', '2:1: name = "": must not be empty'),
     "escapes in the name": (
         *('"test"', '"\\u001b[31m"'),

@@ -1,6 +1,7 @@
 """Files of captures: all forms of stamps, what stands between, and files that are cut or damaged."""
 
 import re
+import struct
 from pathlib import Path
 
 import pytest
@@ -117,6 +118,11 @@ def test_a_cut_file_says_where(tmp_path: Path) -> None:
     assert broken_at(measured(content[:-10], tmp_path)) == len(content) - size
     assert recorded(content[:-10], tmp_path) == recorded(content[:-size], tmp_path)
     assert broken_at(measured(content, tmp_path)) is None
+    # A record of pcap has 16 bytes before its packet.
+    content, size = pcap(PACKETS), 16 + len(PACKETS[-1][1])
+    assert broken_at(measured(content[:-10], tmp_path)) == len(content) - size
+    assert recorded(content[:-10], tmp_path) == recorded(content[:-size], tmp_path)
+    assert broken_at(measured(content, tmp_path)) is None
 
 
 def test_an_interface_that_is_no_ethernet_is_left_out(tmp_path: Path) -> None:
@@ -126,6 +132,29 @@ def test_an_interface_that_is_no_ethernet_is_left_out(tmp_path: Path) -> None:
         measured(content[:36] + b"\x69\x00" + content[38:], tmp_path)
     with pytest.raises(BusplanError, match="link type 105, expected 1, Ethernet"):
         measured(pcap(PACKETS)[:20] + b"\x69\x00\x00\x00", tmp_path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_packets_without_a_time_or_an_interface_are_left_out_and_counted(order: str, tmp_path: Path) -> None:
+    packet = PACKETS[-1][1]
+
+    def block(kind: int, *head: int, fields: str) -> bytes:
+        filled = struct.pack(f"{order}{fields}", *head) + packet + bytes(-len(packet) % 4)
+        return struct.pack(f"{order}II", kind, len(filled) + 12) + filled + struct.pack(f"{order}I", len(filled) + 12)
+
+    content = pcapng(PACKETS, order=order)
+    simple = block(3, len(packet), fields="I")
+    no_interface = block(6, 1, 0, 0, len(packet), len(packet), fields="IIIII")
+    in_2286 = block(6, 0, *divmod(10**10 * 10**9, 2**32), len(packet), len(packet), fields="IIIII")
+    answer = measured(content + simple + no_interface + in_2286, tmp_path)
+    assert "Left out: 3 packets of other protocols or interfaces, or without a time." in answer.remarks
+    # An old packet block is a packet as any other; 65,535 means that nobody counted what was dropped.
+    ticks = 1_700_000_000 * 10**9 + round(PACKETS[-1][0] * 1000)
+    for dropped, said in ((65_535, ()), (7, ("the recorder dropped or cut 7 packets",))):
+        old = block(2, 0, dropped, ticks >> 32, ticks & 0xFFFFFFFF, len(packet), len(packet), fields="HHIIII")
+        answer = measured(pcapng(PACKETS[:-1], order=order) + old, tmp_path)
+        assert {figure.quantity: figure.recorded for figure in answer.figures} == recorded(content, tmp_path)
+        assert answer.shows_nothing == said
 
 
 @pytest.mark.parametrize("order", ["<", ">"])

@@ -35,6 +35,23 @@ def broken(answer: busplan.MeasuredAnswer) -> str:
     return next((remark.removeprefix(start) for remark in answer.remarks if remark.startswith(start)), "")
 
 
+@pytest.mark.parametrize("plan", ["can-servo-8", "ethercat-servo-8"])
+def test_a_file_that_cannot_be_read_is_refused_with_its_reason(
+    plan: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    profile, path = busplan.load_profile(plan), tmp_path / "bus.log"
+    with pytest.raises(BusplanError, match=r"bus\.log: cannot be read: No such file or directory$"):
+        busplan.measured(profile, path)
+    path.touch()
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(BusplanError, match=r"bus\.log: cannot be read: Permission denied$"):
+        busplan.measured(profile, path)
+
+
 LINES = {
     "a stamp of nan s": "(nan) can0 181#00",
     "a stamp of inf s": "(inf) can0 181#00",

@@ -301,6 +301,10 @@ def test_an_encoder_too_fine_for_the_travel_is_refused() -> None:
     setpoints = np.full(10, 1e7)
     with pytest.raises(BusplanError, match=r"too fine for 1e\+07 mm of travel; choose at least 4\.44e-09 mm"):
         simulate_axis(setpoints, axis=an_axis(encoder_resolution_mm=1e-9), timing=TIMING)
+    # A drive may run away all the time: 1e6 mm/s for 10,000 periods of 1 ms.
+    fast = an_axis(encoder_resolution_mm=1e-9, max_velocity_mm_s=1e6)
+    with pytest.raises(BusplanError, match=r"too fine for 1e\+07 mm of travel; choose at least 4\.44e-09 mm"):
+        simulate_axis(np.zeros(10_000), axis=fast, timing=TIMING)
 
 
 @pytest.mark.parametrize(

@@ -238,6 +238,7 @@ def test_the_trace_tells_times_targets_and_positions() -> None:
     for command, position in ((trace.command_x_mm, trace.x_mm), (trace.command_y_mm, trace.y_mm)):
         assert command.shape == position.shape
         np.testing.assert_allclose(command, position, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(run.trace().x_mm, run.x_mm)
     with pytest.raises(BusplanError, match="every = 0"):
         run.trace(every=0)
 

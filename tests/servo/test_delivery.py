@@ -10,6 +10,12 @@ from busplan.servo.delivery import arrival_offsets_us, arrivals, lost_cycles, re
 from busplan.servo.parameters import Delivery
 
 
+def test_a_seed_has_63_bits() -> None:
+    assert Delivery(seed=2**63 - 1).seed == 2**63 - 1
+    with pytest.raises(BusplanError, match="seed = 9223372036854775808: "):
+        Delivery(seed=2**63)
+
+
 def test_the_seed_decides_and_nothing_else() -> None:
     delivery = Delivery(jitter_us=5.0, loss_probability=0.3, seed=7)
     first, again = (arrivals(delivery, name="x", cycles=500, period_us=1000.0) for _ in range(2))

@@ -340,7 +340,7 @@ def _header(document: Document, table: KeyPath) -> Place:
         before = text[_line_start(text, place.key_start) : place.key_start]
         if before.lstrip().startswith("[") and _HEADER_END.match(text, place.key_end):
             return place
-    section = ".".join(map(str, table))
+    section = ".".join(part for part in table if isinstance(part, str))
     raise _LayoutError(f"there is no line [{section}]")
 
 
