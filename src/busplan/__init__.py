@@ -10,9 +10,8 @@ Examples
 <CapacityAnswer: paper-4ms IEEE 1394, 2 nodes, 8 axes, 4 ms FITS>
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False
+"""That of `typing`, which takes long to load: until `busplan.__main__.main` runs, Ctrl-C shows Python's traceback."""
 __version__ = "1.0.0"
 
 __all__ = [
@@ -115,6 +114,8 @@ else:
     """Module of each name that the rule below does not find."""
 
     def __getattr__(name: str) -> object:
+        from importlib import import_module  # noqa: PLC0415 - as for TYPE_CHECKING
+
         if name not in __all__:
             did_you_mean = import_module("busplan.english").did_you_mean
             # A function for a function, a class for a class.

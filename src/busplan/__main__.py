@@ -4,6 +4,9 @@ import atexit
 import gc
 import os
 
+_INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
 
 def main() -> None:
     """Run the command line, tuned for short runs.
@@ -16,11 +19,18 @@ def main() -> None:
     os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
+        import signal
+
+        on_interrupt = signal.getsignal(signal.SIGINT)
+        if on_interrupt is signal.default_int_handler:
+            # Python may print, or even pass over, an exception that comes in the middle of an import.
+            signal.signal(signal.SIGINT, lambda *_: os._exit(_INTERRUPTED))
         from busplan.cli import run
 
+        signal.signal(signal.SIGINT, on_interrupt)
         run()
-    except KeyboardInterrupt:  # The command line could not yet catch it.
-        raise SystemExit(130) from None
+    except KeyboardInterrupt:  # The command line could not yet catch it, or no longer.
+        raise SystemExit(_INTERRUPTED) from None
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import csv
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -182,6 +183,32 @@ def test_any_command_ends_with_the_code_of_its_signal(running: Start, folder: Pa
         ended, _, said = process.end()
     assert (ended, said) == (128 + getattr(signal, name), "")
     assert not (folder / "x.toml").exists()
+
+
+def interpreted(code: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, check=False)
+
+
+def test_nothing_is_loaded_before_ctrl_c_is_heard() -> None:
+    code = "import sys; before = {*sys.modules}; import busplan.__main__; print(*sorted({*sys.modules} - before))"
+    assert set(interpreted(code).stdout.split()) <= {"busplan", "busplan.__main__", "atexit", "gc", "os"}
+
+
+@pytest.mark.parametrize("name", ["busplan.cli", "typer", "busplan.cli.analyse", "pydantic"])
+def test_ctrl_c_while_the_program_loads_ends_it_without_a_word(name: str) -> None:
+    code = f"""
+import os, signal, sys
+class Loading:
+    def find_spec(name, path=None, target=None):
+        if name == {name!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Loading)
+sys.argv = ["busplan", "capacity", "paper-4ms"]
+from busplan.__main__ import main
+main()
+"""
+    ended = interpreted(code)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
 
 
 @pytest.mark.parametrize("name", ["sweep", "check"])

@@ -244,7 +244,9 @@ def test_a_section_inside_an_inline_table_is_refused() -> None:
 
 
 def test_the_line_of_an_inner_section_is_none_of_the_outer_one() -> None:
-    text = PLAIN.replace('{ period_us = 4000, "sync" = { ping_us = 0.3 } } # the cycle', "{}").replace("cycle = {}\n", "")
+    text = PLAIN.replace('{ period_us = 4000, "sync" = { ping_us = 0.3 } } # the cycle', "{}").replace(
+        "cycle = {}\n", ""
+    )
     text = f"cycle.period_us = 4000\n{text}\n[cycle.sync]\nping_us = 0.3\n"
     with pytest.raises(BusplanError, match=r"there is no line \[cycle\], .*\n\[cycle\]\nslice_ratio = 0\.5$"):
         edited(text, {"cycle.slice_ratio": 0.5})

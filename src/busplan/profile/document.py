@@ -314,8 +314,9 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     # Defaults may be constants.
     kept = {} if constants else _unchanged(profile, changes.keys())
     data = profile.model_dump(exclude_unset=True, exclude=set(kept))
+    arrays: dict[int, Any] = {}
     for key, value in changes.items():
-        table, last = holder(data, key, name=origin.get(key))
+        table, last = holder(data, key, name=origin.get(key), arrays=arrays)
         table[last] = value
     with constants_changed(tuple(sorted((dict(profile.constants) | constants).items()))):
         result = _checked(data | kept)

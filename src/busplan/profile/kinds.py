@@ -138,16 +138,21 @@ def _steps(
             data = data.get(part) if isinstance(data, Mapping) else None
 
 
-def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[dict[str, Any], str]:
+def holder(
+    data: dict[str, Any], key: str, *, name: str | None = None, arrays: dict[int, Any] | None = None
+) -> tuple[dict[str, Any], str]:
     """Table of a dotted key, created if it is missing, and the name of the key in it.
 
-    `name` is the key's name in messages; None for the key itself. BusplanError: a part of the key is a value, or there
-    is no table of that name.
+    `name` is the key's name in messages; None for the key itself. `arrays` keeps look-ups of arrays from one key of
+    `data` to the next. BusplanError: a part of the key is a value, or there is no table of that name.
     """
     *sections, last = key.split(".")
     table: object = data
+    arrays = {} if arrays is None else arrays
     for number, section in enumerate(sections):
-        tables = named_tables(table)
+        if not isinstance(table, dict) and id(table) not in arrays:
+            arrays[id(table)] = table, named_tables(table)  # with the array, so that its identity stays its own
+        _, tables = arrays.get(id(table), (table, None))
         if tables is not None:
             if section not in tables:
                 raise BusplanError(

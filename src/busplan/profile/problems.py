@@ -42,6 +42,7 @@ _OUT_OF_RANGE: Final = {
     "finite_number": "must be finite",
     "string_too_short": "must not be empty",
     "too_short": "must not be empty",
+    "too_long": "has {actual_length:,} entries, must have {max_length:,} or fewer",
     "string_pattern_mismatch": "must not be blank",
     "string_too_long": "must be no longer than {max_length} characters",
 }

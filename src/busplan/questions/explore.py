@@ -17,7 +17,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, load_network, require_cycle, with_its_constants
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.capacity.verdict import Verdict, verdicts_of
-from busplan.questions.fit.grid import capacities
+from busplan.questions.fit.grid import capacities, require_few_tables
 from busplan.questions.fit.network import changed
 from busplan.questions.map import (
     Along,
@@ -40,6 +40,8 @@ MOST_VALUES: Final = 32
 """Most values of a slider: their cells are large enough to be chosen."""
 MOST_SETTINGS: Final = 5000
 """Most settings of a page, so that it opens at once."""
+_MOST_TABLES: Final = 20_000
+"""Most groups and messages of all settings together: each setting has its card."""
 _TIMES: Final = (0.5, 1, 2, 3, 4)
 """Payloads by default, as multiples of the profile's own."""
 
@@ -170,7 +172,7 @@ def explore(
             network.profile, question="an explorer of period and axes", instead="give x and y, each a key with values"
         )
     chosen = directions(network, x, y, with_circle=circle)
-    _require_few(*chosen, third)
+    _require_few(network, *chosen, third)
     maps, cards = [], []
     for number, variant in enumerate(networks):
         part = part_of(progress, number=number, of=len(networks))
@@ -218,7 +220,7 @@ def _is_possible(network: Network, key: str, value: Value) -> bool:
     return False
 
 
-def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
+def _require_few(network: Network, x: Direction, y: Direction, third: Direction | None) -> None:
     """Refuse a grid that is too large for a page."""
     sizes = {along.key: len(along.values) for along in (x, y, third) if along is not None}
     for key, size in sizes.items():
@@ -226,6 +228,7 @@ def _require_few(x: Direction, y: Direction, third: Direction | None) -> None:
             raise BusplanError(f"{key}: {size} values; a slider has up to {MOST_VALUES}. A map or a sweep takes more")
     if (settings := prod(sizes.values())) > MOST_SETTINGS:
         raise BusplanError(f"{settings:,} settings; an explorer has up to {MOST_SETTINGS:,}: give fewer values")
+    require_few_tables(network, settings=settings, most=_MOST_TABLES)
 
 
 def _card(answer: MapAnswer, verdict: Verdict | None, cell: Cell | NotDrawn) -> blocks.Card | None:

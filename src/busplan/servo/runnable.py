@@ -11,8 +11,8 @@ from busplan.servo.parameters import Axis, Delivery, LoopTiming, Refused
 
 MAX_SETPOINTS = 10_000_000
 """Most set-points of a move, 2.8 h at 1 ms; more is a typing error."""
-MAX_STEPS = 50_000_000
-"""Positions of two axes take 800 MB."""
+MAX_STEPS = 10_000_000
+"""Positions of two axes, and what is computed from them, take 400 MB."""
 LONGEST_SETTLING_US = 60e6
 """Longest lead-in in which loops may settle [us]."""
 

@@ -148,7 +148,7 @@ def test_the_verdict_and_the_map_stand_before_all_that_is_folded() -> None:
             "NOT RUN, the cycle does not fit the bus: it needs 263.320 us of 150.000 us.",
         ),
         (changed(servo__position_gain_per_s=1e5), "Not drawn: the position loop is unstable."),
-        (changed(bus__nodes=5000), "The cycle is not drawn: bus.nodes = 5000: a timeline shows up to 1000 nodes"),
+        (changed(bus__nodes=5000), "The timeline is not drawn: bus.nodes = 5000: a timeline shows up to 1000 nodes"),
         (changed(circle__feed_mm_per_min=1e6), "The circle test cannot be run: circle.feed_mm_per_min = 1000000.0: "),
         ("dvrk", "The circle test cannot be run: the profile has no section for it."),
     ],
@@ -160,7 +160,7 @@ def test_what_is_not_shown_is_said(profile: busplan.Profile | str, words: str) -
     assert words in Tags(html).text
     assert words.removesuffix(".") in markdown
     (document,) = answer.to_dict()["profiles"]
-    assert bool(document["missing"]) == words.startswith("The c")
+    assert bool(document["missing"]) == words.startswith("The ")
     assert all(why in Tags(html).text for why in document["missing"])
 
 

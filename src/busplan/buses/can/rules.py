@@ -10,7 +10,7 @@ from typing import Final
 from busplan.buses.can.cycle import WORST_STUFFING, CanCycle, can_cycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
 from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
-from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, traffic_of
+from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, of_node, traffic_of
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown
 from busplan.buses.network import Network
@@ -177,7 +177,7 @@ def _when_full(load: float) -> str:
 
 def _pdos(network: Network) -> Number:
     """PDOs of all nodes in one direction [1]."""
-    return total(pdos.number for pdos in traffic_of(network).pdos if pdos.kind == "read")
+    return total(group.nodes * of_node(group) for group in network.groups)
 
 
 _LOAD: Final = "the bus load with the longest bits"

@@ -19,6 +19,7 @@ from busplan.sections.base import (
     MAX_TIME_US,
     MIN_STEP_US,
     MISSING,
+    TABLES,
     TRANSACTION_KINDS,
     Count,
     Problem,
@@ -309,12 +310,10 @@ class CanProfile(Profile):
     )
     payload: CanPayload | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[CanGroup, ...], Field(strict=False)] = Field(
+    group: Annotated[tuple[CanGroup, ...], TABLES] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
-    message: Annotated[tuple[CanMessage, ...], Field(strict=False)] = Field(
-        default=(), description="Other messages on the bus"
-    )
+    message: Annotated[tuple[CanMessage, ...], TABLES] = Field(default=(), description="Other messages on the bus")
     limits: CanLimits = Field(default_factory=CanLimits, description="Requirements of the gate beyond fitting")
 
     @property

@@ -352,8 +352,10 @@ def _worst(
     a bound is no longer than what is enough, it stands for the response.
     """
     levels: dict[object, list[int]] = {}
+    queue_places = [stream.queue_place for stream in sent if stream.queue_place is not None]
     for number in answered:
-        later = [stream.queue_place > sent[number].end_place for stream in sent if stream.queue_place is not None]
+        end_place = sent[number].end_place
+        later = [place > end_place for place in queue_places]
         # Those before the same ends of queues meet all others alike.
         is_plain = all(isinstance(is_it, bool) for is_it in later)
         levels.setdefault(sum(later) if is_plain else f"message {number}", []).append(number)

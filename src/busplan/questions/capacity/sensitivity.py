@@ -297,8 +297,17 @@ class Sensitivity(NamedTuple):
     """Empty for a network that is not shown to fit."""
 
 
+MOST_GROUPS: Final = 50
+"""Most groups that are changed, each by itself."""
+
+
 def sensitivity_of(network: Network) -> Sensitivity:
-    """Every small change of a network, with its cycle computed anew."""
+    """Every small change of a network, with its cycle computed anew.
+
+    BusplanError: the network has too many groups.
+    """
+    if (groups := len(network.profile.node_groups)) > MOST_GROUPS:
+        raise BusplanError(f"{groups:,} groups: sensitivity changes each by itself, of up to {MOST_GROUPS}")
     now = cycle_figures(network, model=network.bus.deciding_model)
     effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))

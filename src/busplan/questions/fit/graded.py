@@ -97,8 +97,8 @@ def traced_network(network: Network) -> Network:
 
 def _selects_formula(profile: Profile, key: str) -> bool:
     """Whether the value of a key is a word that selects a formula."""
-    names = choosing_keys(bus_of(profile))
-    return any(key == group.node_key(name) for group in profile.node_groups for name in names)
+    common_key, _ = _common_key(profile, key)
+    return common_key in {f"node.{name}" for name in choosing_keys(bus_of(profile))}
 
 
 def choosing_keys(bus: Bus) -> tuple[str, ...]:

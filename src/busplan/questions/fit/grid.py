@@ -32,6 +32,20 @@ AXES: Final = "axes"
 _Changes: TypeAlias = tuple[tuple[str, object], ...]
 
 
+MOST_TABLES: Final = 50_000
+"""Most groups and messages of all settings of a picture together."""
+
+
+def require_few_tables(network: Network, *, settings: int, most: int = MOST_TABLES) -> None:
+    """Refuse a grid whose settings all together have too many groups and messages."""
+    tables = len(network.profile.node_groups) + len(getattr(network.profile, "message", ()))
+    if settings * tables > most:
+        raise BusplanError(
+            f"{settings:,} settings of {tables:,} groups and messages take too long: give values for up to "
+            f"{most // tables:,} settings"
+        )
+
+
 class Chunk(NamedTuple):
     """A contiguous part of a grid."""
 

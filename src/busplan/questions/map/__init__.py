@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
-from math import ceil
+from math import ceil, prod
 from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
@@ -26,7 +26,7 @@ from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import CycleFigures, FitFigures, shortest_period_us
-from busplan.questions.fit.grid import AXES, Grid, GridPoint, GridPoints, fits_at, points_of
+from busplan.questions.fit.grid import AXES, Grid, GridPoint, GridPoints, fits_at, points_of, require_few_tables
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.network import PERIOD, at_period
 from busplan.questions.sweep import axis_values
@@ -259,9 +259,10 @@ def map_(
 def possible_points(network: Network, x: Direction, y: Direction | None) -> GridPoints:
     """The points of two directions, column by column.
 
-    BusplanError: a profile can have none of them.
+    BusplanError: a profile can have none of them, or they are too many for its groups and messages.
     """
     along = (x,) if y is None else (x, y)
+    require_few_tables(network, settings=prod(len(one.values) for one in along))
     points = points_of(network, Grid({one.key: np.array(one.values, dtype=object) for one in along}))
     if not points.possible:
         raise BusplanError(f"no setting of this map can exist: {next(iter(points.refused.values()))}")

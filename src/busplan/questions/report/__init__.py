@@ -1,7 +1,7 @@
 """`busplan.report`."""
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -32,6 +32,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.base.sentences import changed_report, document
 from busplan.questions.capacity import capacity
+from busplan.questions.capacity.sensitivity import MOST_GROUPS
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.circle import circle_test
 from busplan.questions.explain import explain
@@ -267,23 +268,27 @@ def _reported(
         words = options if takes_period else [*change_options(without, period_us=0.0)]
         return " ".join(("busplan", name, shell_word(argument), *more, *words))
 
-    bus = capacity(profile, sensitivity=profile.has_cycle)
-    more = ("--sensitivity",) if profile.has_cycle else ()
-    missing: list[str] = []
+    is_varied = profile.has_cycle and len(profile.node_groups) <= MOST_GROUPS
+    bus, more = capacity(profile, sensitivity=is_varied), ("--sensitivity",) if is_varied else ()
+    is_left_out = profile.has_cycle and not is_varied
+    missing = [f"What moves the margin is not shown: it is for up to {MOST_GROUPS} groups."] if is_left_out else []
+
+    def drawn(name: str, title: str, question: Callable[[Profile], Answer]) -> Iterator[PageSection]:
+        try:
+            answer = question(profile).report()
+        except BusplanError as error:  # more groups or nodes than can be drawn
+            missing.append(f"The {name} is not drawn: {error}.")
+        else:
+            yield PageSection(name, title, command(name), answer)
 
     def sections() -> Iterator[PageSection]:
         yield PageSection("capacity", "Every figure of the cycle", command("capacity", *more), bus.report())
         if profile.has_cycle:
-            yield PageSection("map", "What fits, and what limits it", command("map"), map_(profile).report())
+            yield from drawn("map", "What fits, and what limits it", map_)
         latencies = latency(profile).report()
         yield PageSection("latency", "Delay of data", command("latency"), latencies)
         if profile.has_cycle:
-            try:
-                events = timeline(profile).report()
-            except BusplanError as error:  # more nodes than can be laid out
-                missing.append(f"The cycle is not drawn: {error}.")
-            else:
-                yield PageSection("timeline", "The cycle to scale", command("timeline"), events)
+            yield from drawn("timeline", "The cycle to scale", timeline)
         if _asks_for_circle(profile, circle):
             if refused := _circle_refused(profile):
                 missing.append(f"The circle test cannot be run: {refused}.")
