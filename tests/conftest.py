@@ -18,6 +18,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from busplan.cli import run as run_command_line
+from tests.registers import QUICK
 
 Git = Callable[..., bytes]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -30,10 +31,12 @@ os.environ.pop("PYTHONUNBUFFERED", None)  # whoever tests it sets it
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # The few examples are the same in each run, so that whoever runs the tests first sees what the last one saw; a slow one
-# is no failure where the machine is shared. New ones, after a change of a computation, and at times without any:
-# pytest --hypothesis-profile=thorough
+# is no failure where the machine is shared. More of them, as continuous integration has: --hypothesis-profile=many.
+# New ones, after a change of a computation, and at times without any: --hypothesis-profile=thorough.
+# `tests.registers.at_least` gives a test more or fewer than others, and random machines their number.
 EASY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
-settings.register_profile("quick", EASY, max_examples=20, derandomize=True)
+settings.register_profile("quick", EASY, max_examples=QUICK, derandomize=True)
+settings.register_profile("many", EASY, max_examples=4 * QUICK, derandomize=True)
 settings.register_profile("thorough", EASY, max_examples=500)
 settings.load_profile("quick")
 

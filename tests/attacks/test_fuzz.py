@@ -27,6 +27,7 @@ import busplan
 from busplan.buses import kind_names
 from busplan.cli import app
 from busplan.forms import Form, render
+from tests.registers import at_least
 
 Data = dict[str, Any]
 Schema = Mapping[str, Any]
@@ -234,7 +235,7 @@ def require_forms(answer: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", kind_names())
-@settings(max_examples=settings().max_examples // 5)
+@settings(max_examples=at_least(2))
 @given(seed=st.integers(0, 1 << 32))
 def test_every_question_answers_or_refuses_and_all_tell_one_story(
     kind: str, seed: int, tmp_path_factory: pytest.TempPathFactory

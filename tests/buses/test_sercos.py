@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.limits import ANY_PERIOD, Periods
+from tests.registers import at_least
 
 Run = Callable[..., Any]
-FEW = settings(max_examples=15)
+FEW = settings(max_examples=at_least(7))
 KINDS = pytest.mark.parametrize("kind", ["sercos3", "sercos2"])
 KNOWN = Periods((31.25, 62.5, 125.0, 250.0, 500.0))
 

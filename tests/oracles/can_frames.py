@@ -4,6 +4,8 @@ The lengths of classical frames are those of can-utils' canframelen (exact) and 
 tests/buses/can/test_frames.py holds them. No tool is known that counts the stuff bits of an FD frame.
 """
 
+from functools import cache
+
 NEVER_STUFFED = 13
 CRC_15 = 0x4599
 
@@ -130,6 +132,7 @@ STUFF_STEP = 4
 """Bits from one stuff bit to the next where they come closest: a stuff bit counts among the next five alike."""
 
 
+@cache
 def most_bits(size: int, *, identifier_bits: int) -> int:
     """Most bits of any frame with so much data, interframe space included."""
     open_to_stuffing = len(before_stuffing(0, bytes(size), identifier_bits=identifier_bits))
@@ -137,6 +140,7 @@ def most_bits(size: int, *, identifier_bits: int) -> int:
     return open_to_stuffing + stuff_bits + NEVER_STUFFED
 
 
+@cache
 def fd_most_bits(size: int, *, identifier_bits: int) -> tuple[int, int]:
     """Most bits at each rate of any FD frame with so much data, each part by itself; interframe space included."""
     padded = next(length for length in DLC_LENGTHS if length >= size)

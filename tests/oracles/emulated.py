@@ -92,10 +92,9 @@ class Subject:
         path.write_bytes(content)
         (file,) = busplan.check(self.path, recording=path, circle=False).files
         if file.failure:
-            return Recording(truth, {}, (("refused", file.failure),))
-        figures = {figure.quantity: figure for figure in busplan.measured(self.path, path).figures}
+            return Recording(self.path, path, truth, (("refused", file.failure),))
         findings = ((finding.severity, finding.message) for finding in file.findings if finding.code.startswith("BP40"))
-        return Recording(truth, figures, tuple(findings))
+        return Recording(self.path, path, truth, tuple(findings))
 
     @cached_property
     def clean(self) -> "Recording":
@@ -128,14 +127,20 @@ class Subject:
         return frozenset(self.random.sample(range(3, self.cycles), number))
 
 
-class Recording(NamedTuple):
+@dataclass(frozen=True)
+class Recording:
     """A recording."""
 
+    profile: Path
+    path: Path
     truth: dict[str, float]
-    figures: dict[str, Any]
-    """Figures of `measured` by their quantity."""
     findings: tuple[tuple[str, str], ...]
     """Severity and words of what the gate finds."""
+
+    @cached_property
+    def figures(self) -> dict[str, Any]:
+        """Figures of `measured` by their quantity."""
+        return {figure.quantity: figure for figure in busplan.measured(self.profile, self.path).figures}
 
     @property
     def errors(self) -> list[str]:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import Direction, circle_path, settling_time_us
+from tests.registers import at_least
 
 if TYPE_CHECKING:
     import control
@@ -118,7 +119,7 @@ def test_two_linear_loops_make_the_ellipse_of_their_frequency_responses(
         assert smallest * 1e3 == pytest.approx(lowest_um, abs=0.5)
 
 
-@settings(max_examples=15)
+@settings(max_examples=at_least(7))
 @given(kp=st.floats(20, 300), ki_share=st.floats(0, 0.5), lag_share=st.floats(0, 0.5))
 def test_equal_linear_loops_run_a_round_circle_whatever_they_are(kp: float, ki_share: float, lag_share: float) -> None:
     """Shares of 0.25 are double poles."""

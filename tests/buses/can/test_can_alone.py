@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import busplan
 from tests.buses.can import machines
 from tests.buses.can.machines import figures, loaded, phases
+from tests.registers import at_least
 
 Run = Callable[..., Any]
 CAR = """\
@@ -167,7 +168,7 @@ MESSAGES = st.lists(
 
 
 @given(MESSAGES, st.sampled_from([125, 500]))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=at_least(30))
 def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
     messages: list[dict[str, Any]], rate: float
 ) -> None:
@@ -183,7 +184,7 @@ def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
     st.lists(st.tuples(st.integers(0x170, 0x210), st.sampled_from([11, 29]), st.booleans()), max_size=8),
     st.one_of(st.none(), st.tuples(st.integers(1, 9), st.integers(1, 20))),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=at_least(40))
 def test_identifiers_that_stand_twice_are_told(
     said: list[tuple[int, int, bool]], machine: tuple[int, int] | None
 ) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import busplan
 from tests.buses.can.machines import figures, loaded, responses, terms
+from tests.registers import at_least
 
 Run = Callable[..., Any]
 PLAN = """\
@@ -199,7 +200,7 @@ def network(nodes: int, reserve: float, queue: str, period_us: float, deadline_u
     period_us=st.sampled_from([3000.0, 4000.0, 5000.0]),
     deadline_us=st.sampled_from([2000.0, 3000.0, 10_000.0]),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=at_least(6))
 def test_so_many_repeated_frames_as_the_card_says_leave_the_verdict(**drawn: Any) -> None:
     profile = network(**drawn)
     answer = busplan.capacity(profile)

@@ -22,6 +22,7 @@ import busplan
 from tests.buses.can.machines import loaded, responses
 from tests.oracles.can_frames import most_us
 from tests.oracles.can_simulation import Frame, Run, SimulatedMessage, SimulatedNode, simulate
+from tests.registers import at_least
 
 CYCLES: Final = 4
 FULL: Final = 1
@@ -554,8 +555,8 @@ def attacked(seed: int, networks: int, *, runs: int, kind: str = "") -> dict[str
 
 
 def test_no_simulated_run_takes_longer_than_the_model() -> None:
-    best = attacked(540, 60, runs=150)
-    assert best.pop("networks")[0] > 15
+    best = attacked(540, at_least(15), runs=150)
+    assert best.pop("networks")[0] > at_least(4)
     for name, (share, seed) in best.items():
         # Bounds are all but reached: a model that says less fails.
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
@@ -564,15 +565,15 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
 @pytest.mark.parametrize(
     ("kind", "first", "networks"),
     [
-        *((kind, 0, 60) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs")),
-        ("errors", 1300, 80),
-        ("queues", 0, 150),
-        ("late SYNCs", 0, 120),
+        *((kind, 0, at_least(15)) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs")),
+        ("errors", 1300, 80),  # it takes as many until the worst of them meet
+        ("queues", 0, at_least(40)),
+        ("late SYNCs", 0, at_least(30)),
     ],
 )
 def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str, first: int, networks: int) -> None:
     best = attacked(first, networks, runs=150, kind=kind)
-    assert best.pop("networks")[0] > 10
+    assert best.pop("networks")[0] > networks // 15
     for name, (share, seed) in best.items():
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
 

@@ -7,6 +7,7 @@ import pytest
 
 import busplan
 from tests.buses.can.machines import WORST, loaded
+from tests.registers import some
 
 NODE = {"axes": 2, "execution": {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 1.0}}
 BASE: dict[str, Any] = {
@@ -107,7 +108,7 @@ def test_a_sweep_has_at_each_point_what_capacity_has(monkeypatch: pytest.MonkeyP
     own = loaded(data)
     rows = busplan.sweep(own, vary=vary, timing_model=[WORST]).to_dict()["rows"]
     points = [dict(zip(vary, values, strict=True)) for values in product(*vary.values())]
-    for point, row in zip(points, rows, strict=True):
+    for point, row in some(zip(points, rows, strict=True), 6):
         assert {key: row[key] for key in vary} == point
         answer = busplan.capacity(busplan.load_profile(own, changes=point), timing_model=[WORST])
         (result,) = answer.to_dict()["results"]

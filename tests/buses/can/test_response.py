@@ -19,6 +19,7 @@ import busplan
 from tests.buses.can.machines import WORST, figures, loaded
 from tests.oracles import can_textbook as textbook
 from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
+from tests.registers import at_least
 
 KBIT_S: Final = 500
 BIT_US: Final = 2
@@ -106,7 +107,7 @@ MESSAGES: Final = st.lists(
 
 @pytest.mark.parametrize("form", FORMS)
 @given(messages=MESSAGES)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=at_least(30))
 def test_a_simulation_reaches_each_response_and_never_passes_it(messages: list[dict[str, Any]], form: str) -> None:
     # Data at 1000 kbit/s: all frames are whole microseconds, with a switch of bit rate and without.
     found = latencies(network(*messages, data_bit_rate_kbit_s=1000), form=form)
@@ -126,7 +127,7 @@ def test_a_simulation_reaches_each_response_and_never_passes_it(messages: list[d
 
 
 @given(MESSAGES, st.randoms(use_true_random=False))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=at_least(20))
 def test_no_other_start_takes_longer(messages: list[dict[str, Any]], random: Random) -> None:
     found = latencies(network(*messages, data_bit_rate_kbit_s=1000))
     sent = []

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
+from tests.registers import at_least
 
 MOST: Final = 1538
 BYTE_US: Final = 0.08
@@ -117,7 +118,7 @@ GROUPS = st.lists(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=at_least(20))
 @given(GROUPS, st.booleans(), st.booleans(), st.integers(0, 4))
 @example([(1, 1466, 1)], True, True, 0)  # all the room beside the clocks
 @example([(2, 1467, 1)], True, True, 0)  # one byte more: the clocks go alone, in a padded frame
@@ -135,7 +136,7 @@ def test_frames_are_those_of_a_writer(groups: list[Sized], is_shared: bool, cloc
     assert vendors_us["receive"] == pytest.approx(frames[-1].wire_bytes * BYTE_US)
 
 
-@settings(max_examples=10)
+@settings(max_examples=at_least(5))
 @given(st.integers(1, 1486), st.booleans(), st.integers(1, 200))
 def test_a_sweep_and_a_derivation_have_what_each_number_of_devices_has(size: int, clocks: bool, other: int) -> None:
     plan = profile([(1, size, 0), (3, other, 0)], clocks=clocks)

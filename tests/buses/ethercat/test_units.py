@@ -14,6 +14,7 @@ import busplan
 from busplan.buses import kind_named
 from busplan.errors import BusplanError
 from tests.oracles.ethercat_recording import first_cycles
+from tests.registers import at_least
 
 BYTE_US: Final = 0.08
 E_BUS_US: Final = 2 * 0.1507
@@ -136,7 +137,7 @@ def test_the_header_of_a_domain_takes_room_of_the_frame(size: int, frames: int) 
     assert drawn_us == pytest.approx(result.required_us, rel=1e-12)
 
 
-@settings(max_examples=30)
+@settings(max_examples=at_least(15))
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans(), st.lists(STARTS, min_size=5, max_size=5))
 def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     groups: list[Rated], units: str, clocks: bool, starts: list[str]
@@ -168,7 +169,7 @@ def moved_us(groups: Sequence[Rated], first: Sequence[int], watched: int) -> flo
     return max(max(each) - min(each) for each in ends.values())
 
 
-@settings(max_examples=30)
+@settings(max_examples=at_least(15))
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.data())
 def test_a_frame_moves_against_sync0_as_units_make_it_longer(
     groups: list[Rated], units: str, data: st.DataObject
@@ -205,7 +206,7 @@ def test_the_fullest_cycle_need_not_be_that_in_which_a_window_frame_ends_last(
     assert ("sync_window" not in deciding(plan).exceeded) == is_kept
 
 
-@settings(max_examples=10)
+@settings(max_examples=at_least(5))
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
 def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated], units: str, clocks: bool) -> None:
     plan, first = profile(groups, units=units, distributed_clocks=clocks), placed(groups, units)

@@ -19,6 +19,7 @@ from busplan.forms.numbers import known_text, sentence_text
 from busplan.profile.document import decode, validate
 from busplan.profile.sources import shipped_names
 from busplan.profile.starter import Machine, machine_text, shared_out
+from tests.registers import at_least
 
 SHIPPED = ("paper-4ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8")
 
@@ -182,7 +183,7 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     assert lines["unsafe"] == "gap count"
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=at_least(15))
 @given(
     period_us=st.sampled_from([2500, 4000, 20000]),
     jitters_us=st.lists(st.integers(0, 9000), min_size=3, max_size=3),
@@ -218,7 +219,7 @@ def test_can_without_messages_has_none_that_is_late() -> None:
     assert "latest message" not in lines
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=at_least(15))
 @given(name=st.sampled_from(SHIPPED), period_us=st.sampled_from([250, 1000, 2000, 4000, 64000]))
 def test_what_is_used_and_free_fills_what_the_bus_may_use(name: str, period_us: int) -> None:
     answer = busplan.capacity(name, period_us=period_us)

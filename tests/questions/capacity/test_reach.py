@@ -6,9 +6,9 @@ import pytest
 
 import busplan
 from busplan.questions.capacity.sensitivity import Reach
-from tests.registers import shipped_names
+from tests.registers import shipped_of_each_kind
 
-CYCLES = [name for name in shipped_names() if busplan.load_profile(name).has_cycle]
+CYCLES = [name for name in shipped_of_each_kind() if busplan.load_profile(name).has_cycle]
 
 
 def grown(profile: Any, reach: Reach, value: float) -> Any:

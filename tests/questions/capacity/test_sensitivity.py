@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.sections.base import value_at
-from tests.registers import shipped_names
+from tests.registers import shipped_of_each_kind
 
 Maker = Callable[..., busplan.Profile]
 TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
@@ -194,7 +194,7 @@ def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -
 # --- the next bottleneck ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", shipped_of_each_kind())
 def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: str) -> None:
     profile = busplan.load_profile(name)
     bottleneck = next_bottleneck(profile)

@@ -16,7 +16,7 @@ from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.figures import capacity_figures
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
-from tests.registers import shipped_names
+from tests.registers import shipped_of_each_kind
 
 Make = Callable[..., busplan.Profile]
 GRADES = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
@@ -43,11 +43,12 @@ def names(derivation: Any) -> set[str]:
 # --- what is derived is what was computed -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", shipped_of_each_kind())
 def test_every_figure_of_every_kind_ends_in_its_value_and_begins_at_graded_inputs(name: str) -> None:
-    results = {one.timing_model: one.values() for one in busplan.capacity(name).results}
-    for command, figure in busplan.explain(name).figures:
-        for one in busplan.explain(name, f"{command}.{figure.key}").derivations:
+    profile = busplan.load_profile(name)
+    results = {one.timing_model: one.values() for one in busplan.capacity(profile).results}
+    for command, figure in busplan.explain(profile).figures:
+        for one in busplan.explain(profile, f"{command}.{figure.key}").derivations:
             if command == "capacity":
                 assert one.value == pytest.approx(results[one.timing_model][one.figure.key], rel=1e-12)
             assert not one.steps or (one.steps[-1].key, one.steps[-1].value) == (one.figure.key, one.value)

@@ -19,11 +19,11 @@ from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
 from busplan.questions.fit.figures import figures, node_counts
 from busplan.questions.fit.network import changed, model_names, network_of
-from tests.registers import shipped_names
+from tests.registers import at_least, shipped_names
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
 KINDS = pytest.mark.parametrize("kind", kind_names())
-SOME = settings(max_examples=10)  # of each kind
+SOME = settings(max_examples=at_least(5))  # of each kind
 PLACES = st.lists(st.integers(2, 68), min_size=4, max_size=4).map(lambda places: {0, 1, *places})
 """Some of an array, the first two always."""
 
@@ -80,7 +80,7 @@ def test_every_term_has_an_event(kind: str, profiles_by_kind: Profiles) -> None:
             for setting in bus.settings(network_of(profile)):
                 for changes in setting.values:
                     look(busplan.load_profile(profile, changes=changes))
-    settings(max_examples=25, derandomize=True)(given(profiles_by_kind[kind])(look))()
+    settings(max_examples=at_least(10), derandomize=True)(given(profiles_by_kind[kind])(look))()
     assert written == {figure.key for figure in bus.figures.terms}
 
 

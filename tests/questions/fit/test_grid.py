@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_names
 from busplan.forms.blocks import Card
+from tests.registers import at_least
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
 PERIOD, RESERVE = "cycle.period_us", "limits.reserve"
@@ -19,7 +20,7 @@ SHARES = (1, 2)
 
 
 @pytest.mark.parametrize("kind", kind_names())
-@settings(max_examples=3)
+@settings(max_examples=at_least(2))
 @given(data=st.data())
 def test_map_sweep_and_explore_say_of_each_setting_what_capacity_says(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles

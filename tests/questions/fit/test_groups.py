@@ -21,6 +21,7 @@ from busplan.profile.sources import load
 from busplan.questions.fit.figures import COUNTS, CapacityFigures
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
+from tests.registers import at_least
 
 GANTRY = busplan.load_profile("gantry-24")
 
@@ -198,7 +199,7 @@ def test_a_derivation_gives_the_figures(profile: busplan.Profile) -> None:
                 assert derivation.value == values[key]
 
 
-@settings(max_examples=12)
+@settings(max_examples=at_least(6))
 @given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
 def test_a_sweep_gives_what_each_profile_gives(profile: busplan.Profile, nodes: list[int]) -> None:
     name = profile.group[-1].name
@@ -320,7 +321,7 @@ def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., busplan.Prof
 # --- what to set ------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=15)
+@settings(max_examples=at_least(7))
 @given(
     profile=grouped(),
     limits=st.fixed_dictionaries(

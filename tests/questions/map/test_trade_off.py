@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
+from tests.registers import at_least
 
 AXES, PERIOD, TIME = "axes", "cycle.period_us", "time"
 SHORTEST_US, LONGEST_US = 1e-3, 1e9
@@ -102,7 +103,7 @@ def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.S
     assert_cells_are_those_of_capacity(answer)
 
 
-@settings(max_examples=12)
+@settings(max_examples=at_least(6))
 @given(data=st.data())
 def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

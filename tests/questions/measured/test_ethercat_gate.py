@@ -22,6 +22,7 @@ from tests.oracles.ethercat_recording import (
     starts_and_hosts,
     statistics,
 )
+from tests.registers import at_least
 
 Packets = list[tuple[float, bytes]]
 BUS = """schema_version = 1
@@ -290,7 +291,7 @@ def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
     assert next(figure.events for figure in answer.figures if figure.quantity == "period") == 400
 
 
-@settings(max_examples=40)
+@settings(max_examples=at_least(20))
 @given(
     st.sampled_from(["uniform", "normal", "exponential"]),
     st.floats(0.5, 30.0),

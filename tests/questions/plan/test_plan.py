@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from tests.registers import shipped_names
+from tests.registers import at_least, shipped_of_each_kind
 
 Make = Callable[..., busplan.Profile]
 ALL = ("gap_count", "slice_ratio", "responses", "payload", "period", "nodes")
@@ -62,7 +62,7 @@ def test_what_a_plan_writes_passes_the_gate(
 
 
 @pytest.mark.parametrize("kind", ["can", "ethercat", "sercos2", "sercos3"])
-@settings(max_examples=15)
+@settings(max_examples=at_least(7))
 @given(data=st.data())
 def test_other_kinds_of_bus_have_plans_too(
     kind: str, data: st.DataObject, profiles_by_kind: dict[str, st.SearchStrategy[busplan.Profile]]
@@ -71,7 +71,7 @@ def test_other_kinds_of_bus_have_plans_too(
     assert best is None or errors_of(best.profile) == []
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", shipped_of_each_kind())
 def test_shipped_profiles_have_a_plan(name: str) -> None:
     assert busplan.plan(name).recommended is not None
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.sections.base import value_at
+from tests.registers import at_least
 
 Make = Callable[..., busplan.Profile]
 
@@ -67,7 +68,7 @@ def assert_rows_are_those_of_capacity(
     assert not list(rows)
 
 
-@settings(max_examples=12)
+@settings(max_examples=at_least(6))
 @given(data=st.data())
 def test_every_row_equals_capacity_of_its_point(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

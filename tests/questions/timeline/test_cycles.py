@@ -13,6 +13,7 @@ import busplan
 from busplan.buses import kind_named
 from busplan.buses.network import Rate, numbers_by_due
 from busplan.profile.edit import profile_text
+from tests.registers import at_least
 
 Run = Callable[..., Any]
 WORST, NONE = "worst-stuffing", "no-stuffing"
@@ -80,7 +81,7 @@ def multiple_of(groups: Sequence[Rated]) -> range:
     return range(1, lcm(*(group.every for group in groups)) + 1)
 
 
-@settings(max_examples=40)
+@settings(max_examples=at_least(20))
 @given(GROUPS, st.sampled_from([WORST, NONE]), st.sampled_from([0.0, 50.0]))
 def test_a_cycle_on_can_is_that_of_a_network_of_the_groups_that_are_due(
     groups: list[Rated], model: str, host_us: float
@@ -110,7 +111,7 @@ BETWEEN = st.lists(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=at_least(30))
 @given(GROUPS, BETWEEN, st.sampled_from([WORST, NONE]))
 def test_the_events_of_each_cycle_add_up_and_none_takes_longer_than_the_verdict_says(
     groups: list[Rated], between: list[tuple[int, int, float, float]], model: str
