@@ -7,6 +7,7 @@ those that only the new kind has are assumed.
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
 from typing import Any, Literal, NamedTuple
 
 from pydantic import BaseModel
@@ -172,9 +173,9 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
 
 def _defaults(profile: Profile) -> Iterator[AssumedKey]:
     """Keys of the profile's own kind that it leaves to their defaults."""
-    _, names = _common(profile.model_dump())
+    names = {*_common(profile.model_dump())[1]}
     for key, entry in dotted_keys(profile).items():
-        is_own = any(key == name or key.startswith(f"{name}.") for name in names)
+        is_own = not names.isdisjoint(accumulate(key.split("."), "{}.{}".format))
         # Keys without a value and empty arrays are left out.
         if is_own and entry.source == "default" and entry.value is not None and entry.value != ():
             yield AssumedKey(key, entry.value, "default")

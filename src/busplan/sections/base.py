@@ -13,14 +13,14 @@ from busplan.servo.parameters import LARGEST, SHORTEST_STEP_US
 MAX_TIME_US: Final = LARGEST
 MIN_STEP_US: Final = SHORTEST_STEP_US
 MAX_COUNT: Final = 1_000_000
-MAX_TABLES: Final = 500
-"""Most groups, and most messages: each is counted beside all others."""
+MAX_GROUPS: Final = 500
+"""Most groups: each is counted beside all others."""
 
 TimeUs = Annotated[float, Field(ge=0, le=MAX_TIME_US, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
 Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
-TABLES: Final = Field(strict=False, max_length=MAX_TABLES)
-"""An array of tables: strictness would refuse TOML's array for a tuple; the tables stay strict."""
+GROUPS: Final = Field(strict=False, max_length=MAX_GROUPS)
+"""An array of groups: strictness would refuse TOML's array for a tuple; the tables stay strict."""
 
 
 MISSING: Final = "Field required"

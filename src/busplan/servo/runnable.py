@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Refused
 
-MAX_SETPOINTS = 10_000_000
-"""Most set-points of a move, 2.8 h at 1 ms; more is a typing error."""
+MAX_SETPOINTS = 5_000_000
+"""Most set-points of a move, 1.4 h at 1 ms; more take over 500 MB."""
 MAX_STEPS = 10_000_000
 """Positions of two axes, and what is computed from them, take 400 MB."""
 LONGEST_SETTLING_US = 60e6

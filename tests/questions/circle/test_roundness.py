@@ -519,12 +519,12 @@ def test_a_long_test_says_what_it_costs_before_it_runs(
 
     only(small, contributions=True)
     assert caplog.messages == []
-    long = {"circle.radius_mm": 10_000.0, "servo.step_us": 50.0, "servo.drive_offset_mm_s": 0.1}
+    long = {"circle.radius_mm": 3_500.0, "servo.step_us": 50.0, "servo.drive_offset_mm_s": 0.1}
     with pytest.raises(StoppedError):
         busplan.circle_test(changed(small, long), contributions=True, progress=stop)
     (message,) = caplog.messages
-    # 628,339 set-points, 40 steps each, both axes; the same without each of two sources.
-    assert message.startswith("circle test: 150,801,360 steps, about ")
+    # 219,932 set-points, 40 steps each, both axes; the same without each of two sources.
+    assert message.startswith("circle test: 52,783,680 steps, about ")
     assert message.endswith(("GB", "GB, in plain Python"))
 
 

@@ -96,7 +96,7 @@ def test_refusals(options: dict[str, Any], words: str) -> None:
 @pytest.fixture
 def big(make: Make) -> busplan.Profile:
     circle = {"radius_mm": 10_000.0, "feed_mm_per_min": 3000.0, "ramp_periods": 20}
-    return make(circle=circle, cycle__period_us=2000.0, servo={"step_us": 50.0})
+    return make(circle=circle, cycle__period_us=2000.0, servo={"step_us": 200.0})
 
 
 def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
@@ -112,15 +112,15 @@ def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
             busplan.sweep(big, vary=vary, circle=True, executor=Stopped(), **options)
         return caplog.messages
 
-    # 50,267,120 steps at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
+    # 12,566,780 steps at 2 ms, which take about 2 s; where the cycle does not fit, nothing is simulated.
     assert announced({"cycle.period_us": [2000, 100]}) == []
     (message,) = announced({"delivery.seed": [1, 2, 3]})
-    assert message.startswith("circle test: 150,801,360 steps, about ")
+    assert message.startswith("circle test: 37,700,340 steps, about ")
     # The memory of one: they run one behind the other.
-    assert " and 0.58 GB" in message
+    assert " and 0.24 GB" in message
     # Of more points than are looked at, the number is that of all.
     (message,) = announced({"delivery.seed": range(1, 1001)}, unlimited=True)
-    assert message.startswith("circle test: 50,267,120,000 steps, about ")
+    assert message.startswith("circle test: 12,566,780,000 steps, about ")
 
 
 # --- worker processes --------------------------------------------------------------------------

@@ -16,10 +16,10 @@ from busplan.buses.can.equations import (
 from busplan.buses.can.traffic import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
 from busplan.sections.base import (
+    GROUPS,
     MAX_TIME_US,
     MIN_STEP_US,
     MISSING,
-    TABLES,
     TRANSACTION_KINDS,
     Count,
     Problem,
@@ -50,6 +50,8 @@ PdoBytes = Annotated[
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 Queue = Literal["priority", "fifo", "single-buffer"]
 _MOST_CYCLES = 1000
+_MOST_MESSAGES = 1000
+"""Each is counted beside all others."""
 
 
 class CanBus(BusSection):
@@ -310,10 +312,12 @@ class CanProfile(Profile):
     )
     payload: CanPayload | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[CanGroup, ...], TABLES] = Field(
+    group: Annotated[tuple[CanGroup, ...], GROUPS] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
-    message: Annotated[tuple[CanMessage, ...], TABLES] = Field(default=(), description="Other messages on the bus")
+    message: Annotated[tuple[CanMessage, ...], Field(strict=False, max_length=_MOST_MESSAGES)] = Field(
+        default=(), description="Other messages on the bus"
+    )
     limits: CanLimits = Field(default_factory=CanLimits, description="Requirements of the gate beyond fitting")
 
     @property

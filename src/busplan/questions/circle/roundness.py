@@ -140,7 +140,7 @@ _SETPOINT_US: Final = 1.5
 _STEP_BYTES: Final = 18
 """Memory for a step: positions of both axes, and what is computed from them at a time [bytes]."""
 _SETPOINT_BYTES: Final = 200
-_LONG_S: Final = 10.0
+_LONG_S: Final = 5.0
 
 
 class Estimate(NamedTuple):
