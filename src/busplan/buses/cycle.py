@@ -265,7 +265,7 @@ class BusCycle(ABC):
     @property
     def takes_at_sync(self) -> bool:
         """Whether commands of a loop on the host take effect at the next synchronous point, not on arrival."""
-        return self.network.profile.servo.update == "next_sync"
+        return bool(self.network.profile.servo.update == "next_sync")
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].

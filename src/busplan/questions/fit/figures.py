@@ -162,7 +162,9 @@ class CapacityFigures(FitFigures):
         None without axes, and under a model that does not decide.
         """
         counted = max(self.counts, key=lambda count: count.axes, default=None)
-        return counted and axes_in_all(self.axes, counted=counted.axes, safe=counted.safe_axes)
+        if counted is None:
+            return None
+        return axes_in_all(self.axes, counted=counted.axes, safe=counted.safe_axes)
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the JSON document by key, in its order."""
