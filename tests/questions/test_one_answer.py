@@ -11,6 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import pytest
 import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,7 +25,19 @@ from tests.oracles.random_plans import PLANS
 
 Record = Mapping[str, Any]
 NAMES = tuple(name for kind in kind_names() for name in (kind, *kind_named(kind).starter.variants))
-OTHERS = {"cells", "curve", "groups", "events", "totals", "regions", "distinct_cycles", "sensitivity", "reach", "terms"}
+OTHERS = {
+    "cells",
+    "curve",
+    "groups",
+    "events",
+    "totals",
+    "regions",
+    "distinct_cycles",
+    "sensitivity",
+    "next_bottleneck",
+    "reach",
+    "terms",
+}
 """Keys of records that are of other designs, or of parts."""
 ALSO_CALLED = {"smallest_period_us": "fastest_period_us"}
 COUNTS = {"max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by"}
@@ -181,7 +194,17 @@ def documents_agree(answers: Mapping[str, Any], facts: Record) -> None:
                 assert same(value, facts[key]), (name, key, value, facts[key])
     if facts.get("groups") and "compare" in answers:
         counts_agree(answers["compare"].to_dict(), facts)
-    for name in {"latency", "plan", "check", "timeline", "map", "sweep", "compare", "explore"} & answers.keys():
+    for name in {
+        "latency",
+        "plan",
+        "check",
+        "timeline",
+        "map",
+        "sweep",
+        "compare",
+        "explore",
+        "report",
+    } & answers.keys():
         assert "verdict" in shown[name], name
     for name in {"plan", "check", "timeline", "map", "sweep", "compare", "explore"} & answers.keys():
         assert {"margin_corrected_us", "uncertainty_us"} <= shown[name], name
@@ -268,3 +291,9 @@ def test_every_answer_shows_the_verdict_of_capacity(seed: int, tmp_path: Path) -
     documents_agree(answers, facts)
     needs_agree(answers, facts)
     words_agree(answers, facts, has_cycle=profile.has_cycle)
+
+
+@pytest.mark.parametrize("name", ["gantry-24", "can-servo-8", "ethercat-servo-8"])
+def test_so_does_a_report(name: str) -> None:
+    """A report asks the others: its map alone takes too long for random profiles."""
+    documents_agree({"report": busplan.report(name, circle=False)}, facts_of(busplan.capacity(name).to_dict()))
