@@ -116,7 +116,9 @@ def test_comments_inside_arrays_are_seen(changed: Changed, check: Check) -> None
 
 
 def test_one_behind_the_end_of_an_array_is_not_alone_on_its_line(changed: Changed, check: Check) -> None:
-    table = 'kind = "table"\ngrade = "measured"\npayload_bytes = [4,\n16\n] # busplan: ignore[BP110] why\ntime_us = [1, 2]'
+    table = (
+        'kind = "table"\ngrade = "measured"\npayload_bytes = [4,\n16\n] # busplan: ignore[BP110] why\ntime_us = [1, 2]'
+    )
     result = check(changed(('kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35', table)))
     assert said(result) == [("BP902", 26, 3)]
     assert "BP110 has nothing to suppress on line 26" in result.findings[0].message
