@@ -243,15 +243,6 @@ def test_a_section_inside_an_inline_table_is_refused() -> None:
         edited(text, {"cycle.sync.ping_us": 1})
 
 
-def test_the_line_of_an_inner_section_is_none_of_the_outer_one() -> None:
-    text = PLAIN.replace('{ period_us = 4000, "sync" = { ping_us = 0.3 } } # the cycle', "{}").replace(
-        "cycle = {}\n", ""
-    )
-    text = f"cycle.period_us = 4000\n{text}\n[cycle.sync]\nping_us = 0.3\n"
-    with pytest.raises(BusplanError, match=r"there is no line \[cycle\], .*\n\[cycle\]\nslice_ratio = 0\.5$"):
-        edited(text, {"cycle.slice_ratio": 0.5})
-
-
 def test_line_ends_of_two_kinds_are_refused() -> None:
     with pytest.raises(BusplanError, match=r"CRLF.*\n# a: b\n\[bus\]\nnodes = 3"):
         edited(PLAIN.replace("# the bus\n", "# the bus\r\n"), {"bus.nodes": 3}, notes={"bus": "a: b"})

@@ -137,7 +137,7 @@ FAULTS = {
         '19:1: node.execution.kind = "cubic": expected "linear" or "table"',
     ),
     "schema version": ("schema_version = 1", "schema_version = 2", "1:1: schema_version = 2: expected 1"),
-    "schema version as a word": ("schema_version = 1", "schema_version = true", "1:1: schema_version = true: expected 1"),
+    "schema version, true": ("schema_version = 1", "schema_version = true", "1:1: schema_version = true: expected 1"),
     "empty name": ('"test"', '""', '2:1: name = "": must not be empty'),
     "escapes in the name": (
         *('"test"', '"\\u001b[31m"'),

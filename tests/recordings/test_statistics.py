@@ -88,3 +88,13 @@ def test_an_even_clock_has_no_doubt_of_its_bends() -> None:
     periodic = periodic_events(np.arange(count) * 1000.0 + random.uniform(0, 10, count))
     assert periodic is not None
     assert periodic.doubt_us == pytest.approx(0, abs=0.2)
+
+
+def test_a_period_and_its_uncertainty_are_the_same_backwards() -> None:
+    # Late events become early ones: outliers of both sides count alike.
+    times = np.arange(4_000) * 1000.0 + np.random.default_rng(7).exponential(10, 4_000)
+    forwards, backwards = periodic_events(times), periodic_events(times[-1] - times[::-1])
+    assert forwards is not None
+    assert backwards is not None
+    assert backwards.period_us == pytest.approx(forwards.period_us, abs=1e-9)
+    assert backwards.uncertainty_us == pytest.approx(forwards.uncertainty_us, rel=1e-6)

@@ -111,7 +111,6 @@ def _graded(text: str, profile: Profile) -> str:
 
 
 _ASSUMED: Final = "assumed"
-_HEADER_END: Final = re.compile(r"[ \t]*\]")
 _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
 
 
@@ -338,7 +337,7 @@ def _header(document: Document, table: KeyPath) -> Place:
     text, place = document.text, document.places.get(table)
     if place is not None:
         before = text[_line_start(text, place.key_start) : place.key_start]
-        if before.lstrip().startswith("[") and _HEADER_END.match(text, place.key_end):
+        if before.lstrip().startswith("["):
             return place
     section = ".".join(part for part in table if isinstance(part, str))
     raise _LayoutError(f"there is no line [{section}]")
