@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
+from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import network_of
 from tests.buses.can.machines import figures, last_frames, loaded, phases, responses, terms, text_of
 from tests.oracles import can_textbook as textbook
@@ -532,3 +533,10 @@ def test_the_largest_payload_is_four_frames_of_each_pdo(name: str, pdo_per: str)
         larger = network_of(busplan.load_profile(plan, changes={"payload.write_bytes": size}))
         (limit,) = (one for one in larger.bus.limits if one.key == "payload")
         assert (limit.value(larger) <= limit.most(larger)) == is_kept
+
+
+@pytest.mark.parametrize("extra_us", [100.0, 1500.0, 3900.0])
+def test_nodes_that_take_longer_let_more_messages_go_before_them(extra_us: float) -> None:
+    # A node executes twice in a cycle: its feedback, and commands.
+    before, after = (deciding_cycle(network_of(profile(node__execution__base_us=40 + us / 2))) for us in (0, extra_us))
+    assert before.added_us(extra_us) == pytest.approx(after.required_us - before.required_us)
