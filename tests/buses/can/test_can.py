@@ -535,8 +535,8 @@ def test_the_largest_payload_is_four_frames_of_each_pdo(name: str, pdo_per: str)
         assert (limit.value(larger) <= limit.most(larger)) == is_kept
 
 
-@pytest.mark.parametrize("extra_us", [100.0, 1500.0, 3900.0])
-def test_nodes_that_take_longer_let_more_messages_go_before_them(extra_us: float) -> None:
-    # A node executes twice in a cycle: its feedback, and commands.
-    before, after = (deciding_cycle(network_of(profile(node__execution__base_us=40 + us / 2))) for us in (0, extra_us))
-    assert before.added_us(extra_us) == pytest.approx(after.required_us - before.required_us)
+@pytest.mark.parametrize(("extra_us", "alarms"), [(100.0, 0), (1500.0, 1), (3900.0, 2)])
+def test_a_longer_wait_lets_more_messages_go_before_the_commands(extra_us: float, alarms: int) -> None:
+    # 2110 us without alarms and without the commands' execution: two alarms, ceil((w + 100 + 2) / 2000), go first.
+    cycle = deciding_cycle(network_of(profile()))
+    assert cycle.added_us(extra_us) == pytest.approx(extra_us + alarms * 75 * BIT_US)
