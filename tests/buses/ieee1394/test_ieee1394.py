@@ -1,6 +1,7 @@
 """The standard's figures against their public sources."""
 
 from math import ceil, fsum, sqrt
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -161,7 +162,7 @@ def test_what_is_too_many_is_said_at_the_key_of_the_last_nodes(
 @pytest.mark.parametrize("nodes", [2, 6])
 def test_a_cycle_start_goes_between_the_first_rounds_that_are_due_after_it(nodes: int) -> None:
     changes = {"bus.cycle_master": True, "bus.nodes": nodes}
-    cycle = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
+    cycle: Any = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
     now_us, before_us, starts = 0.0, -1.0, 0
     for each in map(list, cycle.each_round()):
         is_start = each[0].kind == "cycle_start"
