@@ -189,3 +189,10 @@ def test_a_finding_has_the_margin_of_capacity(period_us: float) -> None:
     deciding = busplan.capacity(plan).results[0]
     margin = f"corrected margin {deciding.margin_corrected_us:.1f} +/- {deciding.uncertainty_us:.1f} us"
     assert any(margin in one.finding.message for one in busplan.check(plan, circle=False).findings)
+
+
+@pytest.mark.parametrize("charge_hops", ["farthest", "own"])
+def test_events_of_all_nodes_add_up_to_the_cycle(charge_hops: str) -> None:
+    changes = {"bus.nodes": 5, "bus.charge_hops": charge_hops}
+    cycle = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
+    assert fsum(event.us for event in cycle.events()) == pytest.approx(cycle.required_us)
