@@ -44,3 +44,12 @@ def test_no_number_of_a_bus_is_negative(kind: str) -> None:
     found = [pair for name, one in sections.items() if name not in of_circle for pair in numbers(one, name)]
     assert len(found) > 20
     assert [key for key, one in found if one.get("minimum", one.get("exclusiveMinimum", -1)) < 0] == []
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_each_term_has_its_own_label(kind: str) -> None:
+    figures = kind_named(kind).figures
+    for figure in figures.terms:
+        short = figure.key.removeprefix("cycle_").removesuffix("_us")
+        assert figures.term_label(short) == figure.label
+    assert figures.term_label(None) == ""

@@ -10,7 +10,7 @@ from busplan.questions.fit.network import network_of
 from tests.registers import shipped_names
 
 VARIANTS = (
-    ("can-fd-arm-7", {"bus.data_bit_rate_kbit_s": 1000, "bus.bit_rate_kbit_s": 500}),
+    ("can-fd-arm-7", {"bus.data_bit_rate_kbit_s": 500, "bus.bit_rate_kbit_s": 250}),
     ("canopen-6", {"bus.bit_rate_kbit_s": 500, "bus.sync_counter": True, "bus.identifier_bits": 29}),
     ("can-motors-8", {"bus.bit_rate_kbit_s": 500, "bus.access": "burst"}),
     ("dynamixel-arm-14", {"bus.return_delay_us": 250}),

@@ -12,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
+from busplan.questions.fit.certainty import deciding_cycle
+from busplan.questions.fit.network import network_of
 from tests.buses.can.machines import figures, last_frames, loaded, phases, responses, terms, text_of
 from tests.oracles import can_textbook as textbook
 
@@ -520,3 +522,23 @@ def test_a_cycle_waits_for_the_messages_that_arrive_in_it_and_for_no_more(load: 
         lasts_us = own_us + sum(ceil((before_us + 1) / period_us) * frame_us for period_us in periods_us)
     assert 0.48 < figures(own).own.bus_load < 0.99
     assert sum(terms(own).values()) == pytest.approx(lasts_us, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["can-servo-8", "canopen-6", "can-fd-arm-7", "can-motors-8"])
+@pytest.mark.parametrize("pdo_per", ["node", "axis"])
+def test_the_largest_payload_is_four_frames_of_each_pdo(name: str, pdo_per: str) -> None:
+    axes = 3 if pdo_per == "axis" else 1
+    plan = busplan.load_profile(name, changes={"node.axes": axes, "payload.pdo_per": pdo_per})
+    network = network_of(plan)
+    most_bytes = network.bus.payloads(network).most_bytes
+    for size, is_kept in ((most_bytes, True), (most_bytes + 1, False)):
+        larger = network_of(busplan.load_profile(plan, changes={"payload.write_bytes": size}))
+        (limit,) = (one for one in larger.bus.limits if one.key == "payload")
+        assert (limit.value(larger) <= limit.most(larger)) == is_kept
+
+
+@pytest.mark.parametrize(("extra_us", "alarms"), [(100.0, 0), (1500.0, 1), (3900.0, 2)])
+def test_a_longer_wait_lets_more_messages_go_before_the_commands(extra_us: float, alarms: int) -> None:
+    # 2110 us without alarms and without the commands' execution: two alarms, ceil((w + 100 + 2) / 2000), go first.
+    cycle = deciding_cycle(network_of(profile()))
+    assert cycle.added_us(extra_us) == pytest.approx(extra_us + alarms * 75 * BIT_US)

@@ -341,3 +341,10 @@ def test_both_gaps_follow_a_transaction(schedule: str, gap_count: int) -> None:
     gaps_us = (82 + 48 * gap_count) / 98.304  # the paper's equation (10), by the standard's clock
     assert own.read_latency_with_gaps_us - own.read_latency_us == pytest.approx(gaps_us)
     assert own.write_latency_with_gaps_us - own.write_latency_us == pytest.approx(gaps_us)
+
+
+@pytest.mark.parametrize("request_", ["timed", "isochronous", "priority"])
+def test_a_latency_names_the_schedule_of_broadcasts(request_: str) -> None:
+    words = f"broadcast schedule by {request_} requests"
+    assert words in busplan.latency(kit(cycle__broadcast_request=request_)).subject
+    assert words not in busplan.latency(kit(cycle__schedule="individual")).subject

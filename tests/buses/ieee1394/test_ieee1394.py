@@ -1,6 +1,7 @@
 """The standard's figures against their public sources."""
 
 from math import ceil, fsum, sqrt
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -161,7 +162,7 @@ def test_what_is_too_many_is_said_at_the_key_of_the_last_nodes(
 @pytest.mark.parametrize("nodes", [2, 6])
 def test_a_cycle_start_goes_between_the_first_rounds_that_are_due_after_it(nodes: int) -> None:
     changes = {"bus.cycle_master": True, "bus.nodes": nodes}
-    cycle = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
+    cycle: Any = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
     now_us, before_us, starts = 0.0, -1.0, 0
     for each in map(list, cycle.each_round()):
         is_start = each[0].kind == "cycle_start"
@@ -188,3 +189,10 @@ def test_a_finding_has_the_margin_of_capacity(period_us: float) -> None:
     deciding = busplan.capacity(plan).results[0]
     margin = f"corrected margin {deciding.margin_corrected_us:.1f} +/- {deciding.uncertainty_us:.1f} us"
     assert any(margin in one.finding.message for one in busplan.check(plan, circle=False).findings)
+
+
+@pytest.mark.parametrize("charge_hops", ["farthest", "own"])
+def test_events_of_all_nodes_add_up_to_the_cycle(charge_hops: str) -> None:
+    changes = {"bus.nodes": 5, "bus.charge_hops": charge_hops}
+    cycle = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
+    assert fsum(event.us for event in cycle.events()) == pytest.approx(cycle.required_us)

@@ -215,7 +215,7 @@ def test_more_bias_or_reserve_never_improves_and_more_uncertainty_never_shows(
 
 
 def _rank(figures: Any) -> int:
-    return ("does not fit", "not shown to fit", "fits").index(figures.verdict)
+    return ("fits", "not shown to fit", "does not fit").index(figures.verdict)
 
 
 @given(data=st.data())

@@ -4,7 +4,7 @@ import pytest
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.questions.fit.circle_setup import delivery_of
+from busplan.questions.fit.circle_setup import delivery_of, loop_delays_us
 from busplan.questions.fit.network import network_of
 
 CAUSES: dict[str, dict[str, object]] = {
@@ -88,3 +88,19 @@ def test_nodes_with_a_common_clock_or_a_loop_on_the_host_add_no_skew(loop: str, 
     added_us = delivery_of(network).skew_us - 2
     # From the first node to the last there are seven cables and ports.
     assert added_us > 7 * 0.5 if loop == "node" and not has_clocks else added_us == 0
+
+
+def test_a_slower_drive_of_sercos_samples_sooner_and_acts_later() -> None:
+    changes = {"servo.loop": "host", "servo.update": "on_arrival"}
+    execution = {"kind": "linear", "per_byte_us": 0, "grade": "measured"}
+    before_us, after_us = (
+        loop_delays_us(
+            network_of(
+                busplan.load_profile(
+                    "sercos2-servo-8", changes={**changes, "node.execution": {**execution, "base_us": us}}
+                )
+            )
+        )
+        for us in (100, 130)
+    )
+    assert after_us == pytest.approx([us + 2 * 30 for us in before_us])

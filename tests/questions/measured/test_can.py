@@ -370,3 +370,11 @@ def test_apply_writes_the_keys_of_a_message(run: Run, tmp_path: Path) -> None:
     again = run("measured", "arm.toml", "bus.log", "--apply", cwd=tmp_path)
     assert again.returncode == 2
     assert "--apply: bus.log shows no value of a key" in again.stderr
+
+
+def test_steps_of_stamps_are_said(tmp_path: Path) -> None:
+    logged = arbitrated(servo_8(60, seed=1))
+    coarse = [frame._replace(us=frame.us // 10 * 10) for frame in logged]
+    words = "Stamps have steps of 10 us."
+    assert [words in of_log(candump(one), tmp_path).remarks for one in (logged, coarse)] == [False, True]
+    assert not any("steps of" in remark for remark in of_log(candump(logged), tmp_path).remarks)
