@@ -61,7 +61,7 @@ def test_the_paper_is_refused_where_it_is_asked_for(busplan: Run, own: Path, com
     done = busplan(command, "own.toml", *more, "--timing-model", "paper", cwd=own.parent)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "timing_model paper: not applicable, "
+        "--timing-model paper: not applicable, "
         "the paper model has no bus.cycle_master, host.transaction_us; use standard\n"
     )
     assert busplan(command, "own.toml", *more, "--timing-model", "standard", cwd=own.parent).returncode == 0
