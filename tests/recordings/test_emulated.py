@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import cache
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import can
@@ -15,7 +15,8 @@ from tests.oracles import can_recording
 from tests.oracles.emulated import FAULTS, HIDDEN, Fault, Subject
 from tests.registers import at_least
 
-SEEDS = {"can": (9, 16, 22, 26, 34, 42)[: at_least(3)], "ethercat": (1, 3, 8, 14, 21, 31)[: at_least(3)]}
+ALL_SEEDS = {"can": (9, 16, 22, 26, 34, 42), "ethercat": (1, 3, 8, 14, 21, 31)}
+SEEDS = {kind: seeds[: at_least(3)] for kind, seeds in ALL_SEEDS.items()}
 Subjects = Callable[[str, int], Subject]
 
 
@@ -44,8 +45,9 @@ def test_figures_lie_within_their_u_of_the_truth(kind: str, subjects: Subjects) 
 def test_a_fault_larger_than_u_is_named_and_a_recording_that_shows_nothing_says_so(
     fault: Fault, subjects: Subjects
 ) -> None:
-    recordings = {seed: subjects(fault.kind, seed).with_fault(fault) for seed in SEEDS[fault.kind]}
-    named = {seed: fault.is_named(recording) for seed, recording in recordings.items() if recording is not None}
+    recordings = ((seed, subjects(fault.kind, seed).with_fault(fault)) for seed in ALL_SEEDS[fault.kind])
+    judged = ((seed, fault.is_named(recording)) for seed, recording in recordings if recording is not None)
+    named = dict(islice(judged, at_least(2)))
     assert len(named) >= 2
     assert [seed for seed, is_named in named.items() if not is_named] == []
 

@@ -565,10 +565,10 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
 @pytest.mark.parametrize(
     ("kind", "first", "networks"),
     [
-        *((kind, 0, at_least(15)) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs")),
+        *((kind, 45, at_least(15)) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs")),
         ("errors", 1300, 80),  # it takes as many until the worst of them meet
-        ("queues", 0, at_least(40)),
-        ("late SYNCs", 0, at_least(30)),
+        ("queues", 90, at_least(20)),
+        ("late SYNCs", 75, at_least(15)),
     ],
 )
 def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str, first: int, networks: int) -> None:

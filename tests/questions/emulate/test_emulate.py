@@ -32,7 +32,7 @@ Refused = Callable[..., str]
 
 PROFILES = Path(__file__).parents[3] / "profiles"
 SHIPPED = ("ethercat-servo-8", "can-servo-8", "canopen-6", "can-fd-arm-7")
-SEEDS = {"can": range(at_least(5)), "ethercat": range(at_least(3))}
+SEEDS = {"can": range(10), "ethercat": range(6)}
 FAULTS = {kind: kind_named(kind).emulator().faults for kind in SEEDS}  # type: ignore[union-attr]
 LOGICAL = {10: "LRD", 11: "LWR", 12: "LRW"}
 needs_wireshark = pytest.mark.skipif(not (which("tshark") and which("capinfos")), reason="no Wireshark")
@@ -137,6 +137,8 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
             # The late cycle is one of many, and may be early otherwise.
             assert 0.7 * fault.default * period_us <= figure.recorded <= (fault.default + 1) * period_us
         tried += 1
+        if tried == at_least(3):
+            break
     assert tried >= 3
 
 
