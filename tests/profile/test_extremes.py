@@ -12,7 +12,7 @@ from busplan.buses import kind_names
 from busplan.profile.kinds import profile_model
 
 SHIPPED = Path(__file__).parents[2] / "profiles"
-MOST = {"group": 500, "message": 1000}
+MOST = {"group": 500, "message": 2048}
 
 
 def unbounded(node: Any, path: str = "") -> Iterator[str]:

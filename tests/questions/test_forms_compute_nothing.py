@@ -22,6 +22,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.gate.formats import FORMATS
+from busplan.questions.fit.figures import CycleFigures
 
 COMPUTE = ("busplan.buses", "busplan.questions.fit", "busplan.servo")
 REGISTERS = ("busplan.buses", "busplan.buses.figure")
@@ -106,6 +107,7 @@ def reads(records: set[type]) -> set[CodeType]:
     members = [member for kind in records for base in kind.__mro__ for member in vars(base).values()]
     functions = [member.fget if isinstance(member, property) else member for member in members]
     codes = {one.__code__ for one in functions if isfunction(one) and one.__code__.co_argcount == 1}
+    codes.add(CycleFigures.of.__func__.__code__)  # Says which record it is.
     return codes | {part for code in codes for part in code.co_consts if isinstance(part, CodeType)}
 
 

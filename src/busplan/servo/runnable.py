@@ -11,8 +11,8 @@ from busplan.servo.parameters import Axis, Delivery, LoopTiming, Refused
 
 MAX_SETPOINTS = 5_000_000
 """Most set-points of a move, 1.4 h at 1 ms; more take over 500 MB."""
-MAX_STEPS = 10_000_000
-"""Positions of two axes, and what is computed from them, take 400 MB."""
+MAX_STEPS = 40_000_000
+"""Positions of two axes, and what is computed from them, take 1.3 GB."""
 LONGEST_SETTLING_US = 60e6
 """Longest lead-in in which loops may settle [us]."""
 

@@ -90,7 +90,7 @@ def test_the_margin_is_said_in_repeated_frames(run: Run, plan_file: Path) -> Non
     # So many errors in a row, and no other: the verdict is the same, and with one more it is not.
     for burst, verdict in ((most, True), (most + 1, False)):
         errors = {"bus.error_period_us": 1e9, "bus.error_burst": burst}
-        (result,) = busplan.capacity(busplan.load_profile(plan_file, changes=errors)).results[:1]
+        (result,) = busplan.capacity(busplan.load_profile(plan_file, changes=errors)).figures[:1]
         assert (result.verdict == "fits") is verdict
 
 

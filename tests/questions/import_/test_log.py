@@ -360,7 +360,7 @@ def test_fd_frames_without_a_switch_are_planned_without(tmp_path: Path) -> None:
     answer = imported(text, tmp_path, bit_rate_kbit_s=500)
     assert all(message.fd and not message.brs for message in can_profile(answer).message)
     assert can_profile(answer).bus.data_bit_rate_kbit_s is None
-    (figures, *_) = busplan.capacity(answer.profile).results
+    (figures, *_) = busplan.capacity(answer.profile).figures
     # Two frames of 64 bytes in 5 ms, all of it at the nominal rate.
     us = 712 * 1000 / can_profile(answer).bus.bit_rate_kbit_s
     assert busplan.CanMessageFigures.of(figures).bus_load == pytest.approx(2 * us / 5000, rel=0.03)

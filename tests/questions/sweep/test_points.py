@@ -13,6 +13,7 @@ import busplan
 from busplan.buses import kind_names
 from busplan.profile.kinds import cycle_keys
 from busplan.sections.base import value_at
+from tests.registers import shipped_of_each_kind
 
 COUNTS = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
 GROUPS: Mapping[str, Any] = {
@@ -78,6 +79,17 @@ def test_every_figure_of_a_row_is_that_of_its_point(
     some = with_values(profile, key, [0, 1, 3, value])
     if len(some) > 1:
         require_points(profile, {key: some})
+
+
+@pytest.mark.parametrize("name", [*dict.fromkeys((*shipped_of_each_kind(), "dynamixel-arm-14"))])
+def test_every_key_can_be_swept(name: str) -> None:
+    profile = busplan.load_profile(name)
+    for key in cycle_keys(profile):
+        value = value_at(profile, key)
+        given = [] if value is None else [value]
+        some = [] if isinstance(value, str | bool) else with_values(profile, key, [0, 1, 3, *given])[-2:]
+        if len(some) > 1:
+            require_points(profile, {key: some})
 
 
 @pytest.mark.parametrize("polls", [[0, 1], [2, 0]])

@@ -50,8 +50,8 @@ PdoBytes = Annotated[
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 Queue = Literal["priority", "fifo", "single-buffer"]
 _MOST_CYCLES = 1000
-_MOST_MESSAGES = 1000
-"""Each is counted beside all others."""
+_MOST_MESSAGES = 2048
+"""As many as there are identifiers of 11 bits. Each is counted beside all others."""
 
 
 class CanBus(BusSection):

@@ -136,7 +136,8 @@ def times(network: Network) -> Times:
         longest_us = larger(silence_us + most_bits * bit_us + delay_us, shortest_us)
     after_us = silence_us + (_bits_us(most_bits, bit_us) if protocol.master_turns else 0.0)
     silent_us = after_us * (2 if protocol.has_arbiter else 1)
-    return Times(0.0, shortest_us, longest_us, after_us, silent_us, 0.0, bus.timeout_us or 0.0)
+    timeout_us = 0.0 if bus.timeout_us is None else bus.timeout_us
+    return Times(0.0, shortest_us, longest_us, after_us, silent_us, 0.0, timeout_us)
 
 
 def _bits_us(bits: Number, bit_us: Number) -> Number:

@@ -207,7 +207,8 @@ class Sercos3Cycle(SercosCycle):
         start_us, other_us = mdt_us + self.jitter_us, self.network.nonperiodic_us
         if self.method == "mdt-ucc-at":
             start_us = choose(other_us > 0, start_us + self.jitter_us + other_us + self.ring_us, start_us)
-        return self._start_us() + larger(start_us, self.network.profile.bus.at_start_us or 0.0)
+        at_start_us = self.network.profile.bus.at_start_us
+        return self._start_us() + (start_us if at_start_us is None else larger(start_us, at_start_us))
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """Age of feedback when the host has it, and delay of a command up to its effect."""

@@ -127,9 +127,8 @@ def _rests_on_table(verdict: Verdict) -> blocks.Table:
 def _groups_table(answer: CapacityAnswer) -> blocks.Table:
     """Table of the nodes of each group that fit each period, the other groups as they are."""
     columns = [blocks.TableColumn("group", kind="words"), blocks.TableColumn("nodes"), blocks.TableColumn("axes")]
-    shown = [
-        (figures, _GROUP_BY_OTHER if figures.verdict is None else _GROUP_BY_DECIDING) for figures in answer.results
-    ]
+    results = [figures for figures in answer.figures if isinstance(figures, CapacityFigures)]
+    shown = [(figures, _GROUP_BY_OTHER if figures.verdict is None else _GROUP_BY_DECIDING) for figures in results]
     for figures, chosen in shown:
         at = f"{period(figures.period_us)}, " if len(answer.periods) > 1 else ""
         columns += (
@@ -139,7 +138,7 @@ def _groups_table(answer: CapacityAnswer) -> blocks.Table:
             for column in chosen
         )
     rows = []
-    for place, group in enumerate(answer.results[0].groups):
+    for place, group in enumerate(results[0].groups):
         head = (
             blocks.Code(group.name),
             blocks.count_value(group.nodes, "nodes"),
