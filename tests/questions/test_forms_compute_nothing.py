@@ -107,7 +107,8 @@ def reads(records: set[type]) -> set[CodeType]:
     members = [member for kind in records for base in kind.__mro__ for member in vars(base).values()]
     functions = [member.fget if isinstance(member, property) else member for member in members]
     codes = {one.__code__ for one in functions if isfunction(one) and one.__code__.co_argcount == 1}
-    codes.add(CycleFigures.of.__func__.__code__)  # Says which record it is.
+    says_which: Any = CycleFigures.of
+    codes.add(says_which.__func__.__code__)
     return codes | {part for code in codes for part in code.co_consts if isinstance(part, CodeType)}
 
 

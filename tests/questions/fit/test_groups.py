@@ -31,7 +31,7 @@ def changed(profile: busplan.Profile, changes: Mapping[str, object]) -> busplan.
 
 
 def figures(profile: busplan.Profile, model: str = "standard") -> CapacityFigures:
-    (figures,) = busplan.capacity(profile, timing_model=model).figures
+    (figures,) = busplan.capacity(profile, timing_model=model).results
     return figures
 
 
@@ -424,5 +424,5 @@ def test_a_network_of_messages_has_neither_nodes_nor_axes() -> None:
     message = {"name": "m", "identifier": 1, "payload_bytes": 8, "period_us": 10_000}
     bus = {"kind": "can", "bit_rate_kbit_s": 500}
     data = {"schema_version": 1, "name": "messages", "bus": bus, "message": [message]}
-    alone = figures(kind_named("can").profile_model().model_validate(data), "worst-stuffing")
+    alone = busplan.capacity(kind_named("can").profile_model().model_validate(data)).verdicts[0].figures
     assert (alone.nodes, alone.axes, hasattr(alone, "most_axes")) == (0, 0, False)
