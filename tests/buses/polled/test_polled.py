@@ -211,6 +211,22 @@ def test_uarts_at_the_end_of_their_tolerance_stay_within_u(protocol: str, share:
     assert uncertainty_us(double) == pytest.approx(2 * uncertainty_us(profile), rel=0.01)
 
 
+def test_feedback_is_in_answers_and_commands_are_in_requests() -> None:
+    # Robotis, protocol 2.0: a sync read has 14 bytes and 1 of each servo, its answers 11 and the data; a sync write has
+    # 14, and 1 and the data of each servo. A byte takes 10 us at 1 Mbit/s.
+    profile = servo(
+        bus__bit_rate_kbit_s=1000,
+        bus__nodes=3,
+        bus__reads=1,
+        bus__writes=1,
+        payload__read_bytes=4,
+        payload__write_bytes=2,
+    )
+    figures = busplan.capacity(profile, timing_model="standard").results[0].values()
+    assert figures["cycle_request_us"] == pytest.approx(10 * (14 + 3 * 1 + 14 + 3 * (1 + 2)))
+    assert figures["cycle_answer_us"] == pytest.approx(10 * 3 * (11 + 4))
+
+
 @pytest.mark.parametrize("protocol", ["modbus-rtu", "dynamixel-2", "feetech"])
 def test_a_longest_turn_around_counts_once(protocol: str) -> None:
     more: Any = {"bus__max_turn_bits": 100.0, "bus__clock_tolerance": 0.0, "node__execution__grade": "measured"}
