@@ -17,6 +17,7 @@ SCRIPTS = sorted(Path(__file__).parent.glob("*.sh"))
 PROFILE = Path(__file__).parents[2] / "profiles" / "paper-1ms.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_an_attack_does_no_harm(script: Path, tmp_path: Path, program: Path) -> None:
     text = script.read_text(encoding="utf-8")

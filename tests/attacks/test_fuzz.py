@@ -234,6 +234,7 @@ def require_forms(answer: Any) -> None:
         ET.XML(picture)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", kind_names())
 @settings(max_examples=at_least(2))
 @given(seed=st.integers(0, 1 << 32))

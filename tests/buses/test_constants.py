@@ -67,6 +67,7 @@ def changed(profile: Profile, name: str, value: float) -> Profile:
     return busplan.load_profile(profile, changes={f"constants.{name}": value})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), ALL, ids=lambda part: part)
 def test_a_changed_constant_is_assumed_and_leaves_nothing_behind(kind: str, name: str) -> None:
     number, why = float(kind_named(kind).constants[name]), kind_named(kind).constants.fixed.get(name)
@@ -105,6 +106,7 @@ TELLING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("profile", "name"), TELLING.items())
 def test_two_values_in_two_threads_are_two_answers(profile: str, name: str) -> None:
     loaded = busplan.load_profile(profile)
@@ -120,6 +122,7 @@ def test_two_values_in_two_threads_are_two_answers(profile: str, name: str) -> N
 QUESTIONS = [busplan.capacity, busplan.latency, busplan.timeline, busplan.compare, busplan.plan, busplan.map_]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda question: question.__name__)
 def test_an_answer_is_drawn_with_its_own_constants_whatever_was_asked_since(question: Callable[..., Any]) -> None:
     slow = busplan.load_profile("paper-1ms", changes={"constants.ARBITRATION_HOLD_US": 8})

@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 import busplan
 from busplan.buses import kind_named, kind_names
 from tests.registers import shipped_names
@@ -23,6 +25,7 @@ for name in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_a_profile_loads_its_own_kind_of_bus_alone() -> None:
     kind_of = {busplan.load_profile(name).bus.kind: name for name in shipped_names()}
     assert set(kind_of) == set(kind_names())

@@ -161,6 +161,7 @@ def test_github_has_the_plain_report_on_stderr(busplan: Busplan, folder: Path) -
     assert busplan("check", "p", "--format", "github", "-q", cwd=folder).stderr == plain.stdout
 
 
+@pytest.mark.slow
 def test_any_number_of_jobs_gives_the_same_bytes(busplan: Busplan, run: Busplan, folder: Path) -> None:
     circle = CLEAN + "[servo]\nposition_gain_per_s = 30000\n"
     for name, text in (("circle", circle), ("broken", BROKEN), ("held", CLEAN)):
@@ -546,6 +547,7 @@ def action_step(run: Busplan) -> Step:
     return call
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("schema", "files"),
     [
@@ -561,6 +563,7 @@ def test_what_other_programs_read_is_valid(run: Busplan, tmp_path: Path, schema:
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
 def test_the_action_checks_annotates_and_writes_a_summary(action_step: Step, program: Path, folder: Path) -> None:
     put_program(program, folder / "work" / "runner temp" / "busplan" / "bin")
     work = folder / "work"

@@ -91,6 +91,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str
             processes.terminate()
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_loses_nothing(
     cluster: Cluster, environment: dict[str, str], run: Run, tmp_path: Path
 ) -> None:
@@ -147,6 +148,7 @@ run(address)
 """
 
 
+@pytest.mark.slow
 def test_other_versions_and_a_scheduler_that_does_not_answer_are_said(
     cluster: Cluster, environment: dict[str, str], tmp_path: Path
 ) -> None:

@@ -45,6 +45,7 @@ def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
     assert done.stdout.startswith("With --set constants.ARBITRATION_HOLD_US=2.63.")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [

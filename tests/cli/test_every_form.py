@@ -61,6 +61,7 @@ def written(run: Run, question: tuple[str, ...], form: str, **options: Any) -> s
     return str(done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("question", QUESTIONS, ids=" ".join)
 def test_each_form_is_what_it_promises(run: Run, question: tuple[str, ...]) -> None:
     document = json.loads(written(run, question, "json"))
@@ -86,6 +87,7 @@ def test_each_form_is_what_it_promises(run: Run, question: tuple[str, ...]) -> N
     assert not text.endswith("\n\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_the_ending_of_a_file_chooses_the_form(run: Run, ending: str, tmp_path: Path) -> None:
     done = run("evidence", "can", "-o", f"answer{ending}", cwd=tmp_path)
@@ -99,6 +101,7 @@ def test_the_ending_of_a_file_chooses_the_form(run: Run, ending: str, tmp_path: 
     assert (tmp_path / "answer").read_text(encoding="utf-8") == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["timeline", "map", "compare"])
 def test_a_picture_goes_to_a_file_and_down_a_pipe(
     run: Run, refused: Refused, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -81,6 +81,7 @@ def test_it_begins_with_one_sentence_has_an_example_to_copy_and_ends_with_its_ex
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "example"), [pytest.param(name, one, id=one) for name in ("", *COMMANDS) for one in examples(name)]
 )

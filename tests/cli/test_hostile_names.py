@@ -68,6 +68,7 @@ def _shown(arguments: tuple[str, ...]) -> str:
     return ascii(" ".join(arguments)).replace(ascii(EVIL).strip("'"), "EVIL")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", list(calls()), ids=_shown)
 def test_no_name_commands_a_terminal(arguments: tuple[str, ...], run: Run, folder: Path) -> None:
     before = set(folder.iterdir())

@@ -250,6 +250,7 @@ QUESTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_doubts", [False, True], ids=["sure", "doubted"])
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_every_question_is_answered(run: Run, ring_file: Path, question: str, has_doubts: bool) -> None:

@@ -16,6 +16,7 @@ def shown(on_terminal: OnTerminal, *arguments: str, cwd: Path, env: dict[str, st
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["compare", "map", "latency --all", "explain"])
 def test_a_high_answer_opens_in_the_pager(on_terminal: OnTerminal, tmp_path: Path, command: str) -> None:
     lines = shown(on_terminal, *command.split(), "paper-4ms", cwd=tmp_path, env={**LOW, **PAGER}).splitlines()
@@ -23,6 +24,7 @@ def test_a_high_answer_opens_in_the_pager(on_terminal: OnTerminal, tmp_path: Pat
     assert all(line.startswith("PAGED:") for line in lines)
 
 
+@pytest.mark.slow
 def test_no_pager_opens_where_none_is_due(on_terminal: OnTerminal, tmp_path: Path) -> None:
     cases: list[tuple[tuple[str, ...], dict[str, str], bool]] = [
         (("--no-pager", "map", "paper-4ms"), {**LOW, **PAGER}, True),

@@ -163,6 +163,7 @@ def test_a_key_of_very_many_parts_is_refused_at_once(tmp_path: Path, part: str) 
     assert done.stderr == b"bad.toml:1:1: too many parts in a key (limit 20)\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("most_bytes", "told"), [(150_000_000, "150 MB (ulimit -v), and busplan needs 200"), (250_000_000, "")]
 )

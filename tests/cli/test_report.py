@@ -138,6 +138,7 @@ def reported(run: Run, shell: Run, *arguments: str, cwd: Path) -> Page:
     return page
 
 
+@pytest.mark.slow
 def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, shell: Run, tmp_path: Path) -> None:
     page = reported(run, shell, "paper-4ms", "--circle", cwd=tmp_path)
     assert len(page.figures) > 200
@@ -161,6 +162,7 @@ def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, sh
     assert "busplan capacity ./-o.toml --sensitivity --period 400us" in page.lines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
@@ -180,6 +182,7 @@ def test_a_profile_that_fails_is_reported_with_exit_0(
     reported(run, shell, "x.toml", "--circle", cwd=tmp_path)
 
 
+@pytest.mark.slow
 def test_a_circle_is_there_where_it_is_asked_for_or_its_servo_is_measured(run: Run, tmp_path: Path) -> None:
     measured = CIRCLE.replace("[circle]", 'grade = "measured"\n[circle]')
     for circle, option, has_circle in (
@@ -194,6 +197,7 @@ def test_a_circle_is_there_where_it_is_asked_for_or_its_servo_is_measured(run: R
         assert any("circle-test" in line for line in page.lines) == has_circle
 
 
+@pytest.mark.slow
 def test_the_same_profile_gives_the_same_bytes_to_a_file_and_to_standard_output(run: Run, tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_text(QUICK + CIRCLE, encoding="utf-8")
     for name, *form in (("a.HTML",), ("page", "--format", "markdown")):

@@ -178,6 +178,7 @@ def verdicts(run: Run, *arguments: str) -> Any:
 # --- the other commands -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_evidence_has_the_papers_part_and_what_else_is_known(run: Run) -> None:
     done = run("evidence", "ieee1394", "--all")
     assert (done.returncode, done.stderr) == (0, "")

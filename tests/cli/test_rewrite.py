@@ -105,6 +105,7 @@ print(number)
 REPORT = ("check", "other.toml", "--no-circle", "--format", "json", "-o", "report")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [*CHANGES.values(), REPORT], ids=[*CHANGES, "report"])
 def test_a_kill_at_any_step_leaves_one_file_or_the_other(run: Run, tmp_path: Path, command: tuple[str, ...]) -> None:
     for name in ("other.toml", "p.toml"):

@@ -85,6 +85,7 @@ def test_every_command_that_reads_a_profile_is_tried_here() -> None:
     assert {*EVERY, *WITHOUT_PROFILE, "measured", "emulate"} == set(COMMANDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", EVERY)
 def test_every_answer_is_that_of_the_edited_file_and_says_so(
     run: Run, folder: Path, edited: Path, command: str

@@ -115,6 +115,7 @@ def rows(path: Path) -> int:
     return len(table) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "code", "whole_group"),
     # A terminal signals the whole group: the workers are to leave each signal to the parent.
@@ -146,6 +147,7 @@ def test_rows_in_the_making_are_no_file_either(running: Start, folder: Path) -> 
     assert (folder / "c.csv").read_text(encoding="utf-8") == "old"
 
 
+@pytest.mark.slow
 def test_a_hangup_that_nohup_ignores_stays_ignored(running: Start, folder: Path) -> None:
     short = (*CIRCLES, "circle.radius_mm=5", "--vary", "servo.position_gain_per_s=100:119")
     with running(*short, "-o", "c.csv", first="signal.signal(signal.SIGHUP, signal.SIG_IGN)") as process:
@@ -156,6 +158,7 @@ def test_a_hangup_that_nohup_ignores_stays_ignored(running: Start, folder: Path)
     assert rows(folder / "c.csv") == 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sweep", "check"])
 def test_workers_and_files_end_with_a_process_that_is_killed(running: Start, folder: Path, name: str) -> None:
     with running(*(SWEEP if name == "sweep" else many_files(folder)), "-o", "c.csv") as process:
@@ -211,6 +214,7 @@ main()
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sweep", "check"])
 def test_a_worker_that_is_killed_is_said(running: Start, folder: Path, name: str) -> None:
     arguments = (*SWEEP, "-o", "c.csv") if name == "sweep" else many_files(folder)

@@ -255,6 +255,7 @@ NO_CIRCLE = (
 )
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_before_it_is_needed(run: Run, tmp_path: Path) -> None:
     helps = [f"{command} --help" for command in COMMANDS]
     plain = [line.format("paper-4ms") for line in (*EQUATIONS, *NO_CIRCLE)]

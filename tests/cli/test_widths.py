@@ -72,6 +72,7 @@ def without_broken(here: Counter[str], there: Counter[str]) -> Counter[str]:
     return joined
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", ["60", "80", "200"])
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_no_width_loses_or_changes_a_word(

@@ -71,6 +71,7 @@ def test_a_file_has_its_title_its_words_and_both_schemes_of_colours(name: str) -
     assert [ink for ink in inks if f".{ink}" not in style] == []
 
 
+@pytest.mark.slow
 @EACH
 def test_words_are_no_wider_than_a_phone_and_those_of_a_png_use_its_width(name: str, tmp_path: Path) -> None:
     note = "word " * 30

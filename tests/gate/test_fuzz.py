@@ -192,6 +192,7 @@ def test_anything_at_all_is_judged(folder: Path, content: bytes) -> None:
     hold(content, folder)
 
 
+@pytest.mark.slow
 def test_hundreds_of_nasty_files_in_one_call(tmp_path: Path) -> None:
     contents = [mutated(seed) for seed in range(60)]
     contents += [value.encode() for value in (*VALUES, *LINES)] + [b"", b"\n", b"\r\n", b"\xef\xbb\xbf"]

@@ -140,6 +140,7 @@ def test_rules_that_do_not_exist_or_must_be_mended_are_refused(refused: Callable
     assert words == "ignore BP001: BP001 cannot be ignored; correct what they find"
 
 
+@pytest.mark.slow
 def test_known_failures_block_no_commit_and_a_further_one_does(busplan: Busplan, tmp_path: Path) -> None:
     """Forty profiles, seven of which fail."""
     (tmp_path / "p").mkdir()

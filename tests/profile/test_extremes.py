@@ -89,6 +89,7 @@ def test_more_tables_than_are_computed_are_refused_at_their_key(tmp_path: Path, 
     assert busplan.load_profile(path).name == data["name"]
 
 
+@pytest.mark.slow
 def test_what_takes_too_long_of_many_groups_is_refused_and_the_report_says_so(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
     path.write_text(tomli_w.dumps(with_groups(60, "ieee1394")), encoding="utf-8")

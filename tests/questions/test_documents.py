@@ -115,6 +115,7 @@ def test_of_every_class_of_bus(command: str, name: str) -> None:
     assert EVERY[command](name).to_dict() == printed(" ".join((first, name, *rest)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", OPTIONS)
 def test_with_the_options_of_the_command(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -154,6 +154,7 @@ def held(value: Any) -> Iterator[type]:
         yield from held(part)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ask", "profile"), ASKED)
 def test_forms_compute_nothing(ask: Ask, profile: busplan.Profile, tmp_path: Path) -> None:
     answer = ask(profile, tmp_path)

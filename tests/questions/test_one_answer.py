@@ -270,6 +270,7 @@ def words_agree(answers: Mapping[str, Any], facts: Record, *, has_cycle: bool) -
     assert limit is None or sum(limit in reason for reason in reasons) == 1
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**32))
 def test_every_answer_shows_the_verdict_of_capacity(seed: int, tmp_path: Path) -> None:
     random = Random(seed)
@@ -293,6 +294,7 @@ def test_every_answer_shows_the_verdict_of_capacity(seed: int, tmp_path: Path) -
     words_agree(answers, facts, has_cycle=profile.has_cycle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gantry-24", "can-servo-8", "ethercat-servo-8"])
 def test_so_does_a_report(name: str) -> None:
     """A report asks the others: its map alone takes too long for random profiles."""

@@ -26,6 +26,7 @@ FILES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "ending"), FILES)
 def test_a_file_has_the_bytes_that_the_command_writes(command: str, ending: str, run: Run, tmp_path: Path) -> None:
     if ending == ".parquet":

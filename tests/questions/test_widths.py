@@ -54,6 +54,7 @@ def words_of(report: Report) -> list[Block]:
     return [block for block in report.blocks if not isinstance(block, Chart)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "profile"), ASKED)
 def test_an_answer_fits_and_has_no_figure_that_is_cut_or_changed(name: str, profile: str) -> None:
     report = answer(name, profile)

@@ -85,6 +85,7 @@ def test_the_gallery_shows_every_picture_in_words_too_and_all_are_small() -> Non
     assert sum((FOLDER / name).stat().st_size for name in shown) <= MOST_PICTURE_BYTES
 
 
+@pytest.mark.slow
 def test_the_commands_for_a_machine_run_as_they_stand(shell: Run, tmp_path: Path) -> None:
     section = PAGES[README].partition("\n## My machine\n")[2]
     commands = re.findall(
@@ -245,6 +246,7 @@ def json_section(command: str) -> str:
     return PAGES[FOLDER / "json.md"].partition(f"\n### {command}\n")[2].partition("\n### ")[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", DOCUMENTS)
 def test_every_json_key_is_listed(command: str) -> None:
     done = CliRunner().invoke(app, [command, *DOCUMENTS[command].split(), "--format", "json"])

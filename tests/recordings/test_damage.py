@@ -192,6 +192,7 @@ def object_of(kind: int, content: bytes) -> bytes:
     return pack("<4sHHII", b"LOBJ", 16, 1, size, kind) + content + bytes(size % 4)
 
 
+@pytest.mark.slow
 def test_a_container_is_inflated_no_further_than_one_can_be(tmp_path: Path) -> None:
     whole, path = log("blf", str(tmp_path)), tmp_path / "bus.blf"
 

@@ -26,6 +26,7 @@ def subjects(tmp_path_factory: pytest.TempPathFactory) -> Subjects:
     return cache(lambda kind, seed: Subject(kind, seed, tmp_path_factory.mktemp(f"{kind}-{seed}")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SEEDS)
 def test_a_machine_that_keeps_its_plan_has_no_error(kind: str, subjects: Subjects) -> None:
     errors = {seed: subjects(kind, seed).clean.errors for seed in SEEDS[kind]}
@@ -41,6 +42,7 @@ def test_figures_lie_within_their_u_of_the_truth(kind: str, subjects: Subjects) 
     assert len(beside) <= 0.05 * len(judged), beside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [*FAULTS, *HIDDEN], ids=lambda fault: f"{fault.kind}: {fault.name}")
 def test_a_fault_larger_than_u_is_named_and_a_recording_that_shows_nothing_says_so(
     fault: Fault, subjects: Subjects

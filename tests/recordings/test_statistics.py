@@ -40,6 +40,7 @@ def test_a_period_is_found_whatever_is_missing(seed: int, scatter: float, count:
     assert periodic.period_us == pytest.approx(100, abs=8 * periodic.uncertainty_us + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["uniform", "normal", "exponential"])
 @pytest.mark.parametrize("count", [10, 40, 400, 4000])
 def test_the_latest_event_is_found_within_its_u(shape: str, count: int) -> None:

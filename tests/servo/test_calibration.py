@@ -29,6 +29,7 @@ def test_the_calibrated_axis_meets_the_papers_figures_within_two_percent(
     assert not run.diverged
 
 
+@pytest.mark.slow
 def test_the_shipped_set_is_where_the_fit_ends(calibration: ModuleType) -> None:
     needed("scipy")
     fitted = calibration.fit(evaluations=6)

@@ -180,6 +180,7 @@ def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
         assert us == pytest.approx(bound)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(st.integers(0x170, 0x210), st.sampled_from([11, 29]), st.booleans()), max_size=8),
     st.one_of(st.none(), st.tuples(st.integers(1, 9), st.integers(1, 20))),

@@ -193,6 +193,7 @@ def network(nodes: int, reserve: float, queue: str, period_us: float, deadline_u
     )
 
 
+@pytest.mark.slow
 @given(
     nodes=st.integers(1, 6),
     reserve=st.sampled_from([0.0, 0.1, 0.3]),

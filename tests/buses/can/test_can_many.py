@@ -42,6 +42,7 @@ def many(count: int, *, load: float, slow: float = 0.5, seed: int = 1) -> buspla
     return loaded({**tomllib.loads(BASE), "message": sent})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "count"),
     [
@@ -104,12 +105,14 @@ def test_a_long_list_of_inputs_stands_once(run: Run, tmp_path: Path) -> None:
     assert len(inputs) < 3  # the messages', and that of the loop
 
 
+@pytest.mark.slow
 def test_a_thousand_messages_are_answered(run: Run, tmp_path: Path) -> None:
     (tmp_path / "many.toml").write_text(text_of(many(1000, load=0.2, slow=0)), encoding="utf-8")
     for command in ("check", "latency"):
         assert run(command, "many.toml", cwd=tmp_path).returncode in (0, 1)
 
 
+@pytest.mark.slow
 def test_a_long_file_with_a_wrong_key_says_so_soon(run: Run, tmp_path: Path) -> None:
     text = text_of(many(1_000, load=0.2, slow=0)).replace("payload_bytes = 8\nperiod", "payload = 8\nperiod")
     (tmp_path / "many.toml").write_text(text, encoding="utf-8")

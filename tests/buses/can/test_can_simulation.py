@@ -562,6 +562,7 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "first", "networks"),
     [

@@ -99,6 +99,7 @@ NETWORKS: dict[str, tuple[dict[str, Any], dict[str, list[float]]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["compiled", "python"])
 @pytest.mark.parametrize("name", NETWORKS)
 def test_a_sweep_has_at_each_point_what_capacity_has(monkeypatch: pytest.MonkeyPatch, name: str, form: str) -> None:

@@ -118,6 +118,7 @@ GROUPS = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(20))
 @given(GROUPS, st.booleans(), st.booleans(), st.integers(0, 4))
 @example([(1, 1466, 1)], True, True, 0)  # all the room beside the clocks
@@ -136,6 +137,7 @@ def test_frames_are_those_of_a_writer(groups: list[Sized], is_shared: bool, cloc
     assert vendors_us["receive"] == pytest.approx(frames[-1].wire_bytes * BYTE_US)
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(5))
 @given(st.integers(1, 1486), st.booleans(), st.integers(1, 200))
 def test_a_sweep_and_a_derivation_have_what_each_number_of_devices_has(size: int, clocks: bool, other: int) -> None:

@@ -169,6 +169,7 @@ def moved_us(groups: Sequence[Rated], first: Sequence[int], watched: int) -> flo
     return max(max(each) - min(each) for each in ends.values())
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(15))
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.data())
 def test_a_frame_moves_against_sync0_as_units_make_it_longer(
@@ -206,6 +207,7 @@ def test_the_fullest_cycle_need_not_be_that_in_which_a_window_frame_ends_last(
     assert ("sync_window" not in deciding(plan).exceeded) == is_kept
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(5))
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
 def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated], units: str, clocks: bool) -> None:
@@ -301,6 +303,7 @@ def test_neighbours_with_the_same_keys_have_cycles_of_their_own() -> None:
     assert deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).own.process_bytes == 20 * 60
 
 
+@pytest.mark.slow
 def test_a_sweep_has_what_each_profile_has() -> None:
     plan = profile([(1, 4, 20, 12), (2, 10, 60, 0), (4, 8, 90, 30), (4, 5, 33, 0)], distributed_clocks=True)
     keys = ("group.g1.every", "group.g2.nodes", "group.g3.read_bytes")

@@ -56,6 +56,7 @@ def test_the_bound_is_the_packets_the_executions_and_the_ways_there_and_back(
     assert found.required_us < result(network("S400", **sizes, **tree)).required_us
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", sorted(RATES_MBIT_S))
 @pytest.mark.parametrize("schedule", ["individual", "broadcast"])
 def test_a_plan_over_the_bound_does_not_fit_and_any_other_is_not_shown_to(speed: str, schedule: str) -> None:

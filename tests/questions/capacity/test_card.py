@@ -125,6 +125,7 @@ def with_tight_deadlines(profile: Any, share: float) -> Any:
 KINDS = ("ieee1394", "can", "ethercat", "sercos2", "sercos3")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*KINDS, "can with deadlines"])
 @given(data=st.data())
 def test_the_period_and_the_nodes_that_it_names_fit_and_the_next_do_not(
@@ -183,6 +184,7 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     assert lines["unsafe"] == "gap count"
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(15))
 @given(
     period_us=st.sampled_from([2500, 4000, 20000]),
@@ -250,6 +252,7 @@ MOST_LINES = 22
 STARTERS = ("firewire", "can", "can-fd", "ethercat", "sercos3", "sercos2", "profibus", "dynamixel", "modbus")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [80, None])
 def test_capacity_is_a_card_of_few_lines_for_every_shipped_profile_and_starter(columns: int | None) -> None:
     profiles: dict[str, busplan.Profile | str] = {name: name for name in shipped_names()}

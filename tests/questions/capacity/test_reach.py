@@ -33,6 +33,7 @@ def broken(profile: Any) -> set[str]:
     return {*figures.exceeded, *(figures.not_shown or ())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CYCLES)
 def test_what_it_names_fits_and_a_little_more_does_not(name: str) -> None:
     profile = busplan.load_profile(name)

@@ -30,6 +30,7 @@ def registers(name: str) -> list[dict[str, Any]]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper-dma", "paper-1ms", "ethercat-servo-8"])
 def test_the_best_setting_is_the_best_of_all(name: str) -> None:
     answer = busplan.capacity(name)

@@ -15,6 +15,7 @@ HOSTILE = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "changes"), HOSTILE, ids=lambda value: value if isinstance(value, str) else "")
 def test_no_circle_is_run_where_nobody_asked(
     name: str, changes: dict[str, object], monkeypatch: pytest.MonkeyPatch

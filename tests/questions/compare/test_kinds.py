@@ -227,6 +227,7 @@ def counted_nodes(figures: Any, group: str) -> int:
     return counts[0] or 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["can-servo-8", "gantry-24", "dvrk"])
 def test_the_points_of_the_curves_are_what_capacity_gives(name: str) -> None:
     found = busplan.compare(name)

@@ -97,11 +97,13 @@ def require_within(answer: busplan.MeasuredAnswer) -> None:
     assert len(answer.shows_nothing) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_machine_without_faults_keeps_its_plan(name: str, tmp_path: Path) -> None:
     require_within(measured(shipped(name), tmp_path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(at_least(3)))
 @pytest.mark.parametrize("kind", SEEDS)
 def test_a_random_machine_without_faults_keeps_its_plan(
@@ -110,6 +112,7 @@ def test_a_random_machine_without_faults_keeps_its_plan(
     require_within(measured(machines(kind, seed), tmp_path, cycles=400, seed=seed + 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [(kind, fault) for kind, faults in FAULTS.items() for fault in faults],
@@ -142,6 +145,7 @@ def test_each_fault_is_found_as_often_and_as_late_as_it_is(
     assert tried >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "fault", "value_us", "verdict", "words"),
     [
@@ -396,6 +400,7 @@ def test_wireshark_reads_what_is_written(name: str, tmp_path: Path) -> None:
 # --- it is no measurement -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED[:2])
 def test_a_synthetic_recording_never_counts_as_a_measurement(name: str, run: Run, tmp_path: Path) -> None:
     machine = shipped(name)

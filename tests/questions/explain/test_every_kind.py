@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 Run = Callable[..., "CompletedProcess[str]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", kind_names())
 @given(data=st.data())
 def test_a_figure_is_explained_as_capacity_has_it(

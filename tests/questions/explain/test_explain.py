@@ -43,6 +43,7 @@ def names(derivation: Any) -> set[str]:
 # --- what is derived is what was computed -----------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_of_each_kind())
 def test_every_figure_of_every_kind_ends_in_its_value_and_begins_at_graded_inputs(name: str) -> None:
     profile = busplan.load_profile(name)
@@ -352,6 +353,7 @@ def test_a_step_says_nothing_twice_and_inputs_that_are_the_same_stand_once() -> 
     assert "Inputs: as for gaps_us, read, standard model." in both
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [40, 60, 80])
 def test_no_line_is_longer_than_the_terminal(width: int) -> None:
     for name in ("gantry-24", "can-servo-8"):

@@ -19,6 +19,7 @@ SHARES = (1, 2)
 """Periods, as multiples of the profile's own."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", kind_names())
 @settings(max_examples=at_least(2))
 @given(data=st.data())

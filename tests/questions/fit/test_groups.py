@@ -169,6 +169,7 @@ def test_events_add_up_to_the_terms(profile: busplan.Profile) -> None:
         assert not of_events
 
 
+@pytest.mark.slow
 @given(profile=grouped())
 def test_each_group_is_counted_as_a_brute_search_counts_it(profile: busplan.Profile) -> None:
     """One node more at a time, the others as they are, each a profile of its own."""

@@ -23,6 +23,7 @@ def loop_us(profile: busplan.Profile) -> float:
     )
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**32), kind=st.sampled_from(["can", "ethercat"]))
 def test_the_circle_has_the_delay_of_the_loop(seed: int, kind: str, tmp_path: Path) -> None:
     plan, path = fitting(kind, seed, tmp_path)

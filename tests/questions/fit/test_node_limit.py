@@ -90,6 +90,7 @@ slice_ratio = 0.9
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ethercat", "ieee1394"])
 def test_of_many_groups_the_most_nodes_of_each_fit_and_one_more_does_not(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "many.toml"

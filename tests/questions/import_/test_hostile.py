@@ -122,6 +122,7 @@ def test_a_file_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:
         busplan.import_profile(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(FILES.iterdir()), ids=lambda path: path.name)
 def test_no_cut_and_no_change_of_a_file_crashes(path: Path, tmp_path: Path) -> None:
     """Each beginning of a file, and the file with bytes changed: a profile or a sentence, never another error."""

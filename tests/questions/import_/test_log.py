@@ -81,6 +81,7 @@ def keys_of(answer: busplan.ImportAnswer) -> dict[tuple[int, bool], Any]:
     return {(message.identifier, (message.identifier_bits or usual) == 29): message for message in profile.message}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_the_log_is_within_the_profile_that_is_made_of_it(seed: int, tmp_path: Path) -> None:
     network = random_network(seed)
@@ -449,6 +450,7 @@ def test_bursts_are_planned_as_bursts(tmp_path: Path) -> None:
     assert busplan.measured(answer.profile, tmp_path / "drive.log").outside == ()
 
 
+@pytest.mark.slow
 def test_many_identifiers_and_any_bytes_are_no_crash(tmp_path: Path) -> None:
     random = Random(4)
     often = [(k * 100_000 + 7, "7FF#00") for k in range(10)]

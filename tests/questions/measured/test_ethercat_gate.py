@@ -130,6 +130,7 @@ def with_gaps(seed: int) -> tuple[str, Machine]:
     return text, machine
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_empty_cycles_miss_nothing_wherever_a_capture_begins_and_others_do(seed: int, tmp_path: Path) -> None:
     plan, machine = with_gaps(seed)

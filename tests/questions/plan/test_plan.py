@@ -61,6 +61,7 @@ def test_what_a_plan_writes_passes_the_gate(
         assert errors_of(changed(profile, dict(relaxation.changes))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["can", "ethercat", "sercos2", "sercos3"])
 @settings(max_examples=at_least(7))
 @given(data=st.data())
@@ -100,6 +101,7 @@ def single_changes(profile: busplan.Profile, name: str) -> Iterator[dict[str, An
             yield from ({"bus.nodes": nodes} for nodes in range(profile.node_groups[0].nodes - 1, 0, -1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["slice_ratio", "period", "payload", "nodes"])
 @given(data=st.data())
 def test_the_least_change_that_is_enough_is_taken(name: str, data: st.DataObject, make: Make) -> None:

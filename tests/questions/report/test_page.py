@@ -68,6 +68,7 @@ def named(names: tuple[str, ...]) -> busplan.ReportAnswer:
     return busplan.report(profiles, title=" ".join(names), origins=origins)
 
 
+@pytest.mark.slow
 def test_hostile_names_make_no_element_and_no_attribute() -> None:
     plain, hostile = (Tags(named(names).html) for names in (("plain",) * len(NAMES), NAMES))
     assert hostile.tags == plain.tags
@@ -100,6 +101,7 @@ def test_a_shell_gives_back_any_path(raw: bytes) -> None:
 # --- the page ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
     two = [changed(), changed(bus__nodes=3)]
     html = busplan.report(two).html
@@ -113,6 +115,7 @@ def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
     assert set(re.findall(r'href="#([^"]*)"', html)) == {"p1", "p2"}
 
 
+@pytest.mark.slow
 def test_headings_go_down_one_by_one_and_tables_have_scopes() -> None:
     for html in (whole().html, busplan.report(["paper-4ms", "paper-1ms"]).html):
         tags = Tags(html).tags
@@ -140,6 +143,7 @@ def test_the_verdict_and_the_map_stand_before_all_that_is_folded() -> None:
 # --- what cannot be shown is said -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("profile", "words"),
     [

@@ -81,6 +81,7 @@ def test_whole_numbers_as_floats_count_nodes() -> None:
     assert answer["bus.nodes"].tolist() == [1, 2, 3]
 
 
+@pytest.mark.slow
 def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
     pd, pl, _ = map(needed, ("pandas", "polars", "pyarrow"))
     answer = busplan.sweep("paper-4ms", vary={**GRID, "cycle.nonperiodic_us": range(1500)})

@@ -56,6 +56,7 @@ class _Lazy(Future[Any]):
         return super().result(timeout)
 
 
+@pytest.mark.slow
 def test_a_sweep_is_the_same_on_every_executor() -> None:
     def document(executor: Executor | None) -> str:
         return busplan.sweep("paper-1ms", vary=SMALL, circle=True, executor=executor).to_json()
@@ -99,6 +100,7 @@ def big(make: Make) -> busplan.Profile:
     return make(circle=circle, cycle__period_us=2000.0, servo={"step_us": 200.0})
 
 
+@pytest.mark.slow
 def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
     big: busplan.Profile, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -130,6 +132,7 @@ def inverse(number: int) -> float:
     return 1 / number
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_lost_is_said_and_none_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     before = active_children()
     stumbles: list[object] = []

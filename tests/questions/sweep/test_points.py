@@ -67,6 +67,7 @@ def require_points(profile: busplan.Profile, vary: Mapping[str, list[float]]) ->
             assert row[key] == (pytest.approx(value, rel=1e-9, abs=1e-9) if isinstance(value, float) else value), key
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", kind_names())
 @given(data=st.data())
 def test_every_figure_of_a_row_is_that_of_its_point(
@@ -81,6 +82,7 @@ def test_every_figure_of_a_row_is_that_of_its_point(
         require_points(profile, {key: some})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*dict.fromkeys((*shipped_of_each_kind(), "dynamixel-arm-14"))])
 def test_every_key_can_be_swept(name: str) -> None:
     profile = busplan.load_profile(name)
@@ -101,6 +103,7 @@ def test_the_last_frame_comes_again_where_no_mailbox_is_asked(
     require_points(loaded(data, tmp_path), {"bus.mailbox_polls": polls})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [[0, 8], [0, 1480, 3]])
 def test_the_first_device_with_data_shares_the_first_frame(tmp_path: Path, sizes: list[float]) -> None:
     require_points(loaded(GROUPS, tmp_path), {"group.first.read_bytes": sizes, "group.third.every": [1, 8]})

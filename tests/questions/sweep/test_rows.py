@@ -63,6 +63,7 @@ def test_what_does_not_exist_is_null_and_empty(tmp_path: Path) -> None:
     assert list(answer["passed"]) == [False, None]
 
 
+@pytest.mark.slow
 def test_a_thousand_pieces_are_one_table(tmp_path: Path) -> None:
     answer = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(20_000)}, timing_model="paper")
     rows = list(csv.DictReader(io.StringIO(saved(answer, tmp_path / "rows.csv").decode())))

@@ -81,6 +81,7 @@ def multiple_of(groups: Sequence[Rated]) -> range:
     return range(1, lcm(*(group.every for group in groups)) + 1)
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(20))
 @given(GROUPS, st.sampled_from([WORST, NONE]), st.sampled_from([0.0, 50.0]))
 def test_a_cycle_on_can_is_that_of_a_network_of_the_groups_that_are_due(
@@ -111,6 +112,7 @@ BETWEEN = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=at_least(30))
 @given(GROUPS, BETWEEN, st.sampled_from([WORST, NONE]))
 def test_the_events_of_each_cycle_add_up_and_none_takes_longer_than_the_verdict_says(
