@@ -92,6 +92,7 @@ def single_changes(profile: busplan.Profile, name: str) -> Iterator[dict[str, An
             own = profile.cycle.period_us
             yield from ({"cycle.period_us": float(us)} for us in range(int(own) + 1, 1000) if us > own)
             yield from ({"cycle.period_us": float(us)} for us in range(1000, 10_000, 10) if us > own)
+            yield from ({"cycle.period_us": float(us)} for us in range(10_000, 100_000, 100) if us > own)
         case "payload":
             for size in range(max(read, write) // 4 * 4, 0, -4):
                 cut = {f"payload.{kind}_bytes": size for kind, own in (("read", read), ("write", write)) if own > size}
