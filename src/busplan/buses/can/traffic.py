@@ -308,7 +308,7 @@ def _traffic_of(network: Network) -> Traffic:
         period_us=network.period_us,
         access=bus.access,
         pdos=tuple(
-            _pdos_of(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
+            _pdos(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
         ),
     )
     if not traffic.has_sync:
@@ -368,23 +368,6 @@ def _queues(network: Network) -> Iterator[frozenset[tuple[str, str]]]:
             cycle = [(SYNC, ""), *((NAMES["write"], group.name) for group in groups)]
         yield from (frozenset({stream, *messages}) for stream in cycle)
         yield frozenset(messages)
-
-
-_KEPT: Final = 4096
-"""PDOs that are kept, at most."""
-_kept: Final[dict[tuple[int, int, TransactionKind, bool], tuple[Group, Any, Pdos]]] = {}
-"""PDOs by group, bus, direction and place, for a search changes one group of many. Group and bus are kept with them, so
-that their identities stay their own.
-"""
-
-
-def _pdos_of(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> Pdos:
-    key = id(group), id(bus), kind, is_first
-    if key not in _kept:
-        if len(_kept) >= _KEPT:
-            _kept.clear()
-        _kept[key] = group, bus, _pdos(group, bus, kind, is_first=is_first)
-    return _kept[key][2]
 
 
 def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> Pdos:
