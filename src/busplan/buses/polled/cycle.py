@@ -1,8 +1,9 @@
 """The cycle of a polled bus: request, turn-around and answer of each node."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, reduce
+from itertools import product
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias, cast
 
 from busplan.buses.cycle import ALL, BUT_FIRST, FIRST, BusCycle, BusEvent, Doubt, Premise, Rounds, Run
@@ -19,7 +20,7 @@ from busplan.buses.polled.protocols import (
     protocol_of,
     times,
 )
-from busplan.elementwise import Number, is_everywhere, is_off, larger, total
+from busplan.elementwise import Number, is_everywhere, is_off, larger, named, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 from busplan.sections.cycle import time_uncertainty_us
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from busplan.buses.polled.section import PolledBus
 
 _Kind: TypeAlias = Literal["exchange", "read", "write"]
+_Share: TypeAlias = Callable[[ProtocolFigures, Number, Number], Number]
+"""Data of a telegram, of those that share the data of a node."""
 TimingModelName = Literal["standard", "typical"]
 STANDARD: Final[TimingModelName] = "standard"
 TYPICAL: Final[TimingModelName] = "typical"
@@ -146,11 +149,8 @@ class _Exchange(NamedTuple):
 
     request_bytes: Number
     answer_bytes: Number = 0
-    """Size of an answer, the mean where requests share data."""
     answers: Number = 0
     """Number of answers [1]."""
-    all_answers_bytes: tuple[Number, ...] = ()
-    """Least and largest size of all answers together."""
 
     @property
     def is_answered(self) -> bool:
@@ -254,42 +254,34 @@ class PolledCycle(BusCycle):
 
     def _longest_us(self, group: Group) -> Number:
         kinds = TRANSACTION_KINDS[:1] if self.way in TOGETHER else self._kinds
-        return self._wire_us(reduce(larger, (self._exchange(kind, group).request_bytes for kind in kinds)))
+        longest = (self._exchange(kind, group, ProtocolFigures.most_data_bytes) for kind in kinds)
+        return self._wire_us(reduce(larger, (exchange.request_bytes for exchange in longest)))
 
     def _times_a_cycle(self, kind: _Kind) -> Number:
         return {"read": self.bus.reads, "write": self.bus.writes}.get(kind, 1)
 
-    def _data(self, kind: TransactionKind, group: Group) -> Number:
-        """Mean data of a request of a node [bytes]."""
-        size = group.read_bytes if kind == "read" else group.write_bytes
-        return self._protocol.data_bytes(size, self._times_a_cycle(kind))
+    def _exchange(self, kind: _Kind, group: Group, share: _Share = ProtocolFigures.data_bytes) -> _Exchange:
+        """The exchange of a kind with a node of a group, or with all of them together.
 
-    def _exchange(self, kind: _Kind, group: Group) -> _Exchange:
-        """The exchange of a kind with a node of a group, or with all of them together."""
+        Where requests share the data of a node, it is one with the mean `share`, or another.
+        """
         protocol, nodes = self._protocol, group.nodes
+        requests = self._times_a_cycle(kind)
+        read_bytes, written_bytes = (share(protocol, size, requests) for size in (group.read_bytes, group.write_bytes))
         if kind == "exchange":
-            answer: Number = protocol.exchange_answer_bytes + protocol.data_bytes(group.read_bytes)
-            request = protocol.exchange_request_bytes + protocol.data_bytes(group.write_bytes)
-            return _Exchange(request, answer, 1, (answer,))
-        data = self._data(kind, group)
+            request = protocol.exchange_request_bytes + written_bytes
+            return _Exchange(request, protocol.exchange_answer_bytes + read_bytes, 1)
+        if kind == "write" and self.way in TOGETHER:
+            return _Exchange(protocol.sync_write_bytes + nodes * (protocol.sync_node_bytes + written_bytes))
         if kind == "write":
-            if self.way in TOGETHER:
-                return _Exchange(protocol.sync_write_bytes + nodes * (protocol.sync_node_bytes + data))
-            answer = protocol.write_answer_bytes
-            return _Exchange(protocol.write_request_bytes + data, answer, 1, (answer,))
-        shares: tuple[Number, ...] = (data,)
-        if not is_everywhere(self.bus.reads <= 1):
-            of_requests = protocol.least_data_bytes, protocol.most_data_bytes
-            shares = tuple(share(group.read_bytes, self.bus.reads) for share in of_requests)
+            return _Exchange(protocol.write_request_bytes + written_bytes, protocol.write_answer_bytes, 1)
+        answer = protocol.read_answer_bytes + read_bytes
         if self.way == "single":
-            answers = tuple(protocol.read_answer_bytes + share for share in shares)
-            return _Exchange(protocol.read_request_bytes, protocol.read_answer_bytes + data, 1, answers)
+            return _Exchange(protocol.read_request_bytes, answer, 1)
         request = protocol.sync_read_bytes + nodes * protocol.sync_node_bytes
         if self.way == "sync":
-            answers = tuple(nodes * (protocol.read_answer_bytes + share) for share in shares)
-            return _Exchange(request, protocol.read_answer_bytes + data, nodes, answers)
-        answers = tuple(protocol.fast_answer_bytes + nodes * (protocol.fast_node_bytes + share) for share in shares)
-        return _Exchange(request, protocol.fast_answer_bytes + nodes * (protocol.fast_node_bytes + data), 1, answers)
+            return _Exchange(request, answer, nodes)
+        return _Exchange(request, protocol.fast_answer_bytes + nodes * (protocol.fast_node_bytes + read_bytes), 1)
 
     def _execution_us(self, kind: str, group: Group) -> Number:
         """Own time of a node before it answers [us]; 0 where it answers from a buffer."""
@@ -303,14 +295,19 @@ class PolledCycle(BusCycle):
     def _waits(self) -> dict[tuple[_Kind, int], Number]:
         """Least time that the adapter adds to an exchange behind another, by kind and group, in their order [us]."""
         waits: dict[tuple[_Kind, int], Number] = {}
-        for kind in self._kinds:
-            for place, group in enumerate(self.network.groups):
-                exchange = self._exchange(kind, group)
-                if exchange.is_answered:
-                    answer_us = self._turn_us + self._execution_us(kind, group) + self._wire_us(exchange.answer_bytes)
-                    wire_us = self._wire_us(exchange.request_bytes) + exchange.answers * answer_us
-                    exchange_us = self._times.before + wire_us + self._times.after
-                    waits[kind, place] = self._adapter.least_wait_us(exchange_us, exchange.all_answers_bytes)
+        for kind, (place, group) in product(self._kinds, enumerate(self.network.groups)):
+            least, most = (
+                self._exchange(kind, group, share)
+                for share in (ProtocolFigures.least_data_bytes, ProtocolFigures.most_data_bytes)
+            )
+            if most.is_answered:
+                answer_us = self._turn_us + self._execution_us(kind, group) + self._wire_us(most.answer_bytes)
+                wire_us = self._wire_us(most.request_bytes) + most.answers * answer_us
+                exchange_us = self._times.before + wire_us + self._times.after
+                named(exchange_us, f"{kind}_exchange_us", "_".join(filter(None, ("w", kind, group.members[0].name))))
+                sizes = [each.answers * each.answer_bytes for each in (least, most)]
+                are_alike = is_everywhere(self._times_a_cycle(kind) <= 1)
+                waits[kind, place] = self._adapter.least_wait_us(exchange_us, sizes[are_alike:])
         return waits
 
     def _adapter_events(self, kind: _Kind, place: int) -> Iterator[BusEvent]:

@@ -1,0 +1,204 @@
+"""The adapter of a polled bus beside an event simulation, and at its ends by hand."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import busplan
+from busplan import BusplanError
+from busplan.buses.polled.cycle import PolledCycle
+from busplan.profile.document import decode, validate
+from busplan.questions.fit.network import network_of
+from tests.oracles.adapter_simulation import Adapter, Exchange, cycle_us, shares
+
+SEEDS = int(os.environ.get("ADAPTER_SEEDS", "0"))
+"""Number of random buses in a run by hand."""
+
+OWN = """[bus.protocol]
+bits_per_byte = 12
+read_request_bytes = 6
+read_answer_bytes = 5
+write_request_bytes = 6
+sync_read_bytes = 7
+sync_write_bytes = 8
+sync_node_bytes = 2
+fast_answer_bytes = 3
+fast_node_bytes = 2
+"""
+
+
+@dataclass
+class Frames:
+    """Bytes of a protocol's telegrams, without data."""
+
+    bits: int
+    read: tuple[int, int]
+    write: tuple[int, int]
+    sync: tuple[int, int, int] = (0, 0, 0)
+    fast: tuple[int, int] = (0, 0)
+    exchange: tuple[int, int] = (0, 0)
+    word: int = 1
+
+
+# ROBOTIS, protocol 2.0; Feetech, SCServo library; Modbus over serial line V1.02; and `OWN`.
+FRAMES = {
+    "dynamixel-2": Frames(10, (14, 11), (12, 11), (14, 14, 1), (8, 4)),
+    "feetech": Frames(10, (8, 6), (7, 6), (8, 8, 1)),
+    "modbus-rtu": Frames(11, (8, 5), (9, 8), exchange=(13, 5), word=2),
+    "own": Frames(12, (6, 5), (6, 0), (7, 8, 2), (3, 2)),
+}
+WAYS = {
+    "dynamixel-2": ("sync", "fast-sync", "single"),
+    "feetech": ("sync", "single"),
+    "modbus-rtu": ("exchange", "single"),
+    "own": ("sync", "fast-sync", "single"),
+}
+
+
+class RandomBus:
+    """A bus as a profile, and as exchanges of the simulation."""
+
+    def __init__(self, rng: Random) -> None:
+        self.rng = rng
+        self.protocol = rng.choice(sorted(FRAMES))
+        self.frames, self.way = FRAMES[self.protocol], rng.choice(WAYS[self.protocol])
+        self.rate = rng.choice([9.6, 57.6, 115.2, 1000.0])
+        self.byte = Fraction(self.frames.bits * 1000) / Fraction(self.rate)
+        self.groups = [
+            (rng.randint(1, 9), 2 * rng.randint(1, 20), 2 * rng.randint(1, 20)) for _ in range(rng.randint(1, 3))
+        ]
+        """Nodes, bytes read and bytes written of each group."""
+        self.reads, self.writes = (1, 1) if self.way == "exchange" else (rng.randint(1, 3), rng.randint(1, 3))
+        self.timer = rng.choice([0, 500, 1000, 2000, 16_000, rng.randint(1, 20_000)])
+        self.packet = rng.choice([1, 8, 62, 62, 510, rng.randint(1, 70)])
+        self.frame = rng.choice([0, 125, 1000])
+        self.delay, self.own = rng.choice([0, 0, 250, 500]), rng.choice([0, 22, 1000])
+        self.host = rng.choice([0, 0, rng.randint(1, 3000)])
+        self.retries, self.timeout = rng.choice([0, 0, 1, 2]), rng.randint(0, 5000)
+        self.silence = Fraction(0)
+        if self.protocol == "modbus-rtu":
+            self.silence = Fraction(77, 2) * 1000 / Fraction(self.rate) if self.rate < 19.2 else Fraction(1750)
+
+    def profile(self) -> busplan.Profile:
+        is_own = self.protocol == "own"
+        groups = "".join(
+            f'[[group]]\nname = "g{number}"\nnodes = {nodes}\naxes = 1\nread_bytes = {read}\nwrite_bytes = {write}\n'
+            f'execution = {{kind = "linear", grade = "measured", base_us = {self.own}, per_byte_us = 0}}\n'
+            for number, (nodes, read, write) in enumerate(self.groups)
+        )
+        text = (
+            f'schema_version = 1\nname = "random"\n[bus]\nkind = "polled"\nbit_rate_kbit_s = {self.rate}\n'
+            + ("" if is_own else f'protocol = "{self.protocol}"\n')
+            + f'requests = "{self.way}"\nreads = {self.reads}\nwrites = {self.writes}\nhost_us = {self.host}\n'
+            f"return_delay_us = {self.delay}\nretries = {self.retries}\ntimeout_us = {self.timeout}\n"
+            f"adapter = {{ timer_us = {self.timer}, packet_bytes = {self.packet}, frame_us = {self.frame} }}\n"
+            + (OWN if is_own else "")
+            + f"[cycle]\nperiod_us = 10000\n{groups}"
+        )
+        return validate(decode(text.encode(), name="random"))
+
+    def exchanges(self) -> list[Exchange]:
+        """Exchanges of a cycle; repeated requests come before any of those with answers."""
+        wait = self.silence + self.delay + self.own
+        parts = [*self._reads(wait)]
+        writes = [] if self.way == "exchange" else [*self._writes(wait)]
+        if self.way == "exchange":
+            parts[0] = parts[0]._replace(pause=Fraction(self.host))
+        else:
+            writes[0] = writes[0]._replace(pause=Fraction(self.host))
+        parts += writes
+        answered = [number for number, part in enumerate(parts) if part.answers]
+        for _ in range(self.retries):
+            number = self.rng.choice(answered)
+            pause = parts[number].pause + self._longest() * self.byte + self.timeout
+            parts[number] = parts[number]._replace(pause=pause)
+        return parts
+
+    def _words(self, size: int, requests: int = 1) -> Iterator[int]:
+        return (self.frames.word * share for share in shares(-(-size // self.frames.word), requests))
+
+    def _longest(self) -> int:
+        of_all, frames = [], self.frames
+        for nodes, _, write in self.groups:
+            if self.way == "exchange":
+                of_all.append(frames.exchange[0] + write)
+            elif self.way == "single":
+                of_all.append(max(frames.read[0], frames.write[0] + max(self._words(write, self.writes))))
+            else:
+                of_all.append(frames.sync[0] + nodes * frames.sync[2])
+        return max(of_all)
+
+    def _reads(self, wait: Fraction) -> Iterator[Exchange]:
+        frames = self.frames
+        for nodes, read, write in self.groups:
+            if self.way == "exchange":
+                for _ in range(nodes):
+                    yield Exchange(frames.exchange[0] + write, [(wait, frames.exchange[1] + read)])
+                continue
+            for size in self._words(read, self.reads):
+                request = frames.sync[0] + nodes * frames.sync[2]
+                if self.way == "sync":
+                    yield Exchange(request, [(wait, frames.read[1] + size)] * nodes)
+                elif self.way == "fast-sync":
+                    yield Exchange(request, [(wait, frames.fast[0] + nodes * (frames.fast[1] + size))])
+                else:
+                    for _ in range(nodes):
+                        yield Exchange(frames.read[0], [(wait, frames.read[1] + size)])
+
+    def _writes(self, wait: Fraction) -> Iterator[Exchange]:
+        frames = self.frames
+        for nodes, _, write in self.groups:
+            for size in self._words(write, self.writes):
+                if self.way in ("sync", "fast-sync"):
+                    yield Exchange(frames.sync[1] + nodes * (frames.sync[2] + size))
+                    continue
+                for _ in range(nodes):
+                    answers = [(wait, frames.write[1])] if frames.write[1] else []
+                    yield Exchange(frames.write[0] + size, answers)
+
+    def simulated_us(self) -> float:
+        rng = self.rng
+        phases = (Fraction(rng.randint(0, 10**6), 10**6) for _ in range(3))
+        timer, frame, start = (phase * length for phase, length in zip(phases, (self.timer, self.frame, 1), strict=True))
+        adapter = Adapter(Fraction(self.timer), self.packet, Fraction(self.frame), timer_phase=timer, frame_phase=frame)
+        return float(cycle_us(self.exchanges(), adapter, start=start, byte=self.byte, silence=self.silence))
+
+
+def ends_us(profile: busplan.Profile) -> tuple[float, float]:
+    cycle, typical = (PolledCycle(network_of(profile), model) for model in ("standard", "typical"))
+    least_us = cycle.required_us - cycle.possible_us()
+    assert typical.required_us == pytest.approx(least_us, rel=1e-9)
+    return least_us, cycle.required_us
+
+
+def place(seed: int) -> tuple[float, float, float]:
+    """Ends of a random bus, and the time that is simulated between them [us]."""
+    bus = RandomBus(Random(seed))
+    least_us, most_us = ends_us(bus.profile())
+    simulated_us = bus.simulated_us()
+    assert least_us * (1 - 1e-9) <= simulated_us <= most_us * (1 + 1e-9), (seed, vars(bus), least_us, simulated_us)
+    return least_us, simulated_us, most_us
+
+
+@given(st.integers(0, 10**9))
+def test_a_cycle_is_never_outside_its_ends(seed: int) -> None:
+    place(seed)
+
+
+def test_both_ends_are_reached() -> None:
+    is_near_least = is_near_most = 0
+    for seed in range(SEEDS or 200):
+        least_us, simulated_us, most_us = place(seed)
+        if most_us > 1.05 * least_us:
+            is_near_least += simulated_us < 1.02 * least_us
+            is_near_most += simulated_us > 0.98 * most_us
+    assert min(is_near_least, is_near_most) >= 3, (is_near_least, is_near_most)
+    if SEEDS:
+        print(f"{SEEDS} buses: {is_near_least} near the lower end, {is_near_most} near the upper one")
