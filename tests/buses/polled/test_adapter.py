@@ -71,10 +71,9 @@ class RandomBus:
         self.frames, self.way = FRAMES[self.protocol], rng.choice(WAYS[self.protocol])
         self.rate = rng.choice([9.6, 57.6, 115.2, 1000.0])
         self.byte = Fraction(self.frames.bits * 1000) / Fraction(self.rate)
-        self.groups = [
-            (rng.randint(1, 9), 2 * rng.randint(1, 20), 2 * rng.randint(1, 20)) for _ in range(rng.randint(1, 3))
-        ]
-        """Nodes, bytes read and bytes written of each group."""
+        sizes = rng.sample(range(2, 41, 2), rng.randint(1, 3))
+        self.groups = [(rng.randint(1, 9), read, 2 * rng.randint(1, 20)) for read in sizes]
+        """Nodes, bytes read and bytes written of each group; no two are alike, which would be one."""
         self.reads, self.writes = (1, 1) if self.way == "exchange" else (rng.randint(1, 3), rng.randint(1, 3))
         self.timer = rng.choice([0, 500, 1000, 2000, 16_000, rng.randint(1, 20_000)])
         self.packet = rng.choice([1, 8, 62, 62, 510, rng.randint(1, 70)])

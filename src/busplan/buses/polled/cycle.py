@@ -398,6 +398,11 @@ class PolledCycle(BusCycle):
             return 0
         return rounds * (group.nodes if self.way == "single" else exchange.answers)
 
+    def part_us(self, *, kind: str) -> float:
+        """Time of the exchanges of a kind, "read", "write" or "exchange", in plain numbers [us]."""
+        parts = (run._replace(events=tuple(e for e in run.events if e.transaction == kind)) for run in self.runs)
+        return sum(us for part in parts for _, us in part.counted_us(part.times or 1))
+
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubts of turn-around and clocks, for all nodes together; and of the nodes' own time.
 

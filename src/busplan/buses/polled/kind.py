@@ -1,9 +1,9 @@
 """Polled buses as a kind of bus."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import reduce
 from itertools import chain
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.limits import (
@@ -101,6 +101,7 @@ class Polled(Bus):
     starter = Starter(
         _SECTIONS["profibus"],
         variants=_SECTIONS,
+        tables={table.lower(): words["execution"] for table, words in c.beside.items() if "execution" in words},
         period="10ms",
         measure="from the end of a request to the answer, less bus.return_delay_us",
         base="time of a node before it answers",
@@ -123,7 +124,12 @@ class Polled(Bus):
         "bus.host_us": Key("t_host", role="host"),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
+    term_removals: ClassVar[tuple[Mapping[str, str], ...]] = ({"bus.adapter": NO_ADAPTER},)
     evidence_data = ("polled",)
+
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """The time of the reads, or the writes, of a cycle."""
+        return {"part_us": PolledCycle.part_us}
 
     def title_of(self, network: Network) -> str:
         """Name of the protocol; for a protocol of the user's own, the name of the kind."""
