@@ -201,3 +201,89 @@ def test_both_ends_are_reached() -> None:
     assert min(is_near_least, is_near_most) >= 3, (is_near_least, is_near_most)
     if SEEDS:
         print(f"{SEEDS} buses: {is_near_least} near the lower end, {is_near_most} near the upper one")
+
+
+ABOVE = {"read and write of one servo, optimised", "fast sync read and write, optimised"}
+"""Measured rows with the wait of a program until its write is out, which is the host's time."""
+
+
+def test_measured_times_lie_between_their_ends() -> None:
+    (kind,) = busplan.evidence("polled").kinds
+    rows = [one for section in kind.sections for one in section.comparisons if one.method.startswith("at ")]
+    assert len(rows) == 2 * (4 + 11 + 2)
+    is_fault = {
+        "at least": lambda residual: residual > 0,
+        "at most": lambda residual: residual < 0,
+    }
+    outside = {row.quantity for row in rows if row.residual is not None and is_fault[row.method](row.residual)}
+    assert outside == ABOVE
+
+
+def servo(**changes: Any) -> busplan.Profile:
+    """One read of 4 bytes from each of 3 servos at 1 Mbaud: 14 and 15 bytes of 10 us, and 50 us, each 340 us."""
+    own: dict[str, Any] = {"node__execution__base_us": 50.0, "bus__host_us": 0.0, "bus__nodes": 3}
+    own |= {"bus__requests": "single", "payload__read_bytes": 4, "node__execution__uncertainty_us": None}
+    own |= {"node__execution__grade": "measured", "bus__clock_tolerance": 0.0, **changes}
+    return busplan.load_profile(
+        "dynamixel-arm-14", changes={key.replace("__", "."): value for key, value in own.items()}
+    )
+
+
+@pytest.mark.parametrize(
+    ("adapter", "least_us", "most_us"),
+    [
+        # The timer hides all but the first exchange, or is hidden; a write of 4 bytes has 16 and 11 bytes, and 50 us.
+        ("ftdi", 340 + 5 * 16_000, 3 * 340 + 3 * 320 + 6 * 17_000),
+        ("ftdi-low-latency", 340 + 5 * 1000, 3 * 340 + 3 * 320 + 6 * 2000),
+        ({"timer_us": 100.0, "frame_us": 125.0}, 3 * 340 + 3 * 320, 3 * 340 + 3 * 320 + 6 * 225),
+        # An answer of 15 bytes fills its packet and goes at once; one of 11 bytes waits.
+        ({"timer_us": 1000.0, "packet_bytes": 15}, 3 * 340 + 3 * 1000, 3 * 340 + 3 * 320 + 6 * 2000),
+        ("none", 3 * 340 + 3 * 320, 3 * 340 + 3 * 320),
+    ],
+)
+def test_the_ends_by_hand(adapter: object, least_us: float, most_us: float) -> None:
+    assert ends_us(servo(bus__adapter=adapter)) == pytest.approx((least_us, most_us))
+
+
+@pytest.mark.parametrize(
+    ("period_us", "verdict"),
+    [(5339.0, "does not fit"), (5341.0, "not shown to fit"), (13_979.0, "not shown to fit"), (13_981.0, "fits")],
+)
+def test_it_fits_by_the_upper_end_and_does_not_by_the_lower(period_us: float, verdict: str) -> None:
+    changes = {"bus__adapter": "ftdi-low-latency", "cycle__period_us": period_us, "node__execution__uncertainty_us": 0.0}
+    assert busplan.capacity(servo(**changes)).verdict == verdict
+
+
+def test_a_fast_sync_read_has_one_answer_of_all() -> None:
+    # Requests as a sync read, 14 + 3 bytes; an answer of 8 and 4 + 4 for each servo, behind one wait of 50 us. The sync
+    # write has 14 and 1 + 4 for each.
+    fast_us = 170 + 50 + (8 + 3 * 8) * 10 + (14 + 3 * 5) * 10
+    assert ends_us(servo(bus__requests="fast-sync", bus__adapter="none")) == pytest.approx((fast_us, fast_us))
+    with pytest.raises(BusplanError, match="it has sync, single"):
+        servo(bus__protocol="feetech", bus__requests="fast-sync")
+
+
+def test_explain_and_the_card_have_both_ends() -> None:
+    profile = servo(bus__adapter="ftdi-low-latency")
+    for figure, ends in (("required_us", (5340, 13_980)), ("cycle_adapter_us", (3360, 12_000))):
+        derivations = busplan.explain(profile, figure).derivations
+        assert [one.value for one in derivations] == pytest.approx(ends[::-1])
+    card = busplan.capacity(profile).verdicts[0].card
+    (used,) = ("".join(map(str, line.parts)) for label, line in card.lines if label == "used")
+    assert used == "at least 5340.0, at most 13980.0 us of 10000, 140 %"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"bus.adapter": "usb"}, 'expected "ftdi", "ftdi-low-latency" or "none"'),
+        ({"bus.adapter": {"timer": 1000}}, "did you mean timer_us"),
+        ({"bus.adapter": {"timer_us": 1000, "packet_bytes": 0}}, "bus.adapter.packet_bytes: must be 1 or more"),
+        ({"bus.adapter_us": 1000.0}, "did you mean adapter"),
+    ],
+)
+def test_a_wrong_adapter_says_what_would_be_right(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(BusplanError) as refused:
+        busplan.load_profile("dynamixel-arm-14", changes=changes)
+    assert words in str(refused.value)
+    assert "(a " not in str(refused.value)

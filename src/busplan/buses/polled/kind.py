@@ -19,7 +19,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
-from busplan.buses.polled.protocols import NO_ADAPTER, adapter_of, c, protocol_of
+from busplan.buses.polled.protocols import FASTEST_FIRST, NO_ADAPTER, adapter_of, c, protocol_of
 from busplan.elementwise import Number, larger
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class Polled(Bus):
         "bus.protocol": Key(chooses=True),
         "bus.nodes": Key(meaning="move the other nodes to a second bus"),
         "bus.bit_rate_kbit_s": Key("f", meaning="in every node"),
-        "bus.requests": Key(chooses=True, meaning="if the host's software can"),
+        "bus.requests": Key(chooses=True, meaning="if the host's software and the nodes can"),
         "bus.return_delay_us": Key("t_delay", meaning="in every node"),
         "bus.clock_tolerance": Key("df"),
         "bus.adapter": Key(grade="assumed"),
@@ -156,7 +156,8 @@ class Polled(Bus):
         higher = tuple(
             {"bus.bit_rate_kbit_s": float(rate)} for rate in protocol.rates["kbit_s"] if rate > bus.bit_rate_kbit_s
         )
-        faster = tuple({"bus.requests": other} for other in protocol.requests[: protocol.requests.index(way)][::-1])
+        ways = [other for other in FASTEST_FIRST if other in protocol.requests]
+        faster = tuple({"bus.requests": other} for other in ways[: ways.index(way)][::-1])
         return (
             Setting("return_delay", "return delay", Cost.REGISTER, ("bus.return_delay_us",), no_delay),
             Setting("bit_rate", "bit rate", Cost.REGISTER, ("bus.bit_rate_kbit_s",), higher),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, rounded_down, rounded_up, smaller, total
@@ -25,6 +25,7 @@ UNLIMITED: Final = 1_000_000
 UNLIMITED_KBIT_S: Final = 1e9
 
 Requests = Literal["exchange", "fast-sync", "sync", "single"]
+FASTEST_FIRST: Final[tuple[Requests, ...]] = get_args(Requests)
 TOGETHER: Final[tuple[Requests, ...]] = ("fast-sync", "sync")
 """Ways in which one request reads all nodes of a group."""
 
