@@ -141,7 +141,9 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
                 "requests": st.sampled_from(ways[protocol]),
                 "reads": st.integers(1, 3),
                 "writes": st.integers(1, 3),
-                "adapter": st.sampled_from(["none", "ftdi-low-latency", "ftdi", {"timer_us": 500.0, "packet_bytes": 8}]),
+                "adapter": st.sampled_from(
+                    ["none", "ftdi-low-latency", "ftdi", {"timer_us": 500.0, "packet_bytes": 8}]
+                ),
                 "host_us": st.floats(0.0, 200.0),
                 "global_control": st.just(is_profibus),
                 "retries": st.integers(0, 2),

@@ -165,7 +165,9 @@ class RandomBus:
     def simulated_us(self) -> float:
         rng = self.rng
         phases = (Fraction(rng.randint(0, 10**6), 10**6) for _ in range(3))
-        timer, frame, start = (phase * length for phase, length in zip(phases, (self.timer, self.frame, 1), strict=True))
+        timer, frame, start = (
+            phase * length for phase, length in zip(phases, (self.timer, self.frame, 1), strict=True)
+        )
         adapter = Adapter(Fraction(self.timer), self.packet, Fraction(self.frame), timer_phase=timer, frame_phase=frame)
         return float(cycle_us(self.exchanges(), adapter, start=start, byte=self.byte, silence=self.silence))
 
@@ -198,9 +200,7 @@ def test_both_ends_are_reached() -> None:
         if most_us > 1.05 * least_us:
             is_near_least += simulated_us < 1.02 * least_us
             is_near_most += simulated_us > 0.98 * most_us
-    assert min(is_near_least, is_near_most) >= 3, (is_near_least, is_near_most)
-    if SEEDS:
-        print(f"{SEEDS} buses: {is_near_least} near the lower end, {is_near_most} near the upper one")
+    assert min(is_near_least, is_near_most) >= (SEEDS or 200) / 50, (is_near_least, is_near_most)
 
 
 ABOVE = {"read and write of one servo, optimised", "fast sync read and write, optimised"}
@@ -250,7 +250,11 @@ def test_the_ends_by_hand(adapter: object, least_us: float, most_us: float) -> N
     [(5339.0, "does not fit"), (5341.0, "not shown to fit"), (13_979.0, "not shown to fit"), (13_981.0, "fits")],
 )
 def test_it_fits_by_the_upper_end_and_does_not_by_the_lower(period_us: float, verdict: str) -> None:
-    changes = {"bus__adapter": "ftdi-low-latency", "cycle__period_us": period_us, "node__execution__uncertainty_us": 0.0}
+    changes = {
+        "bus__adapter": "ftdi-low-latency",
+        "cycle__period_us": period_us,
+        "node__execution__uncertainty_us": 0.0,
+    }
     assert busplan.capacity(servo(**changes)).verdict == verdict
 
 

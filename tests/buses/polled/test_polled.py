@@ -238,8 +238,7 @@ def test_a_longest_turn_around_counts_once(protocol: str) -> None:
         kind = FEETECH if protocol == "feetech" else DYNAMIXEL
         profile = servo(bus__protocol=protocol, bus__requests="single", **more)
         shortest_us, longest_us = (
-            servos_us(kind, 1000, 14, read=10, write=4, reads=1, is_sync=False, turn_us=50 + bits)
-            for bits in (0, 100)
+            servos_us(kind, 1000, 14, read=10, write=4, reads=1, is_sync=False, turn_us=50 + bits) for bits in (0, 100)
         )
     middle_us, u_us = required_us(profile), uncertainty_us(profile)
     assert middle_us == pytest.approx((shortest_us + longest_us) / 2, rel=1e-9)
@@ -248,9 +247,7 @@ def test_a_longest_turn_around_counts_once(protocol: str) -> None:
 
 def test_worldfip_by_hand() -> None:
     # 8 bits a byte at 1 Mbit/s: ID_DAT 8 bytes and RP_DAT 9 and its data, a turn-around of 10 to 70 bits behind each.
-    profile = servo(
-        bus__protocol="worldfip", bus__requests="single", bus__nodes=1, bus__return_delay_us=0.0
-    )
+    profile = servo(bus__protocol="worldfip", bus__requests="single", bus__nodes=1, bus__return_delay_us=0.0)
     read_us = (8 + 9 + 10) * 8 + (10 + 70) / 2 + 70
     write_us = (8 + 9 + 4) * 8 + 2 * 70
     assert required_us(profile) == read_us + write_us
@@ -383,8 +380,10 @@ def test_limits_of_a_protocol(changes: dict[str, Any], limit: str) -> None:
 def test_a_plan_asks_all_at_once_and_sets_the_return_delay(tmp_path: Path) -> None:
     text = Path("profiles/dynamixel-arm-14.toml").read_text(encoding="utf-8")
     path = tmp_path / "slow.toml"
-    text = text.replace('requests = "sync"', 'requests = "single"').replace("dynamixel-2", "feetech").replace(
-        "return_delay_us = 0 ", "return_delay_us = 500 "
+    text = (
+        text.replace('requests = "sync"', 'requests = "single"')
+        .replace("dynamixel-2", "feetech")
+        .replace("return_delay_us = 0 ", "return_delay_us = 500 ")
     )
     path.write_text(text.replace("period_us = 10000", "period_us = 8000"), encoding="utf-8")
     plan = busplan.plan(path, free=["return_delay", "requests"])

@@ -358,7 +358,7 @@ class PolledCycle(BusCycle):
         )
 
     def _around(self, kind: _Kind, place: int, label: str) -> tuple[tuple[BusEvent, ...], tuple[BusEvent, ...]]:
-        """The idle time before a request and the request; and the idle time behind it or its answers, and the adapter."""
+        """What comes before the answers, idle time and request, and behind them, idle time and adapter."""
         exchange = self._exchange(kind, self.network.groups[place])
         after_us = self._times.after if exchange.is_answered else self._times.silent
         request_us = self._wire_us(exchange.request_bytes)

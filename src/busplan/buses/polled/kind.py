@@ -181,7 +181,9 @@ class Polled(Bus):
         """Words for the protocol, the bit rate, and the way that nodes are asked."""
         bus, way = network.profile.bus, PolledCycle(network, STANDARD).way
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
-        asked = {"exchange": "an exchange with each node", "fast-sync": "fast sync requests"}.get(way, f"{way} requests")
+        asked = {"exchange": "an exchange with each node", "fast-sync": "fast sync requests"}.get(
+            way, f"{way} requests"
+        )
         words = f"adapter {bus.adapter}" if bus.adapter != NO_ADAPTER else "no adapter"
         if bus.adapter is not None and not isinstance(bus.adapter, str):
             words = f"adapter with a timer of {bus.adapter.timer_us:g} us"

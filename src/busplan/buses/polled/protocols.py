@@ -5,7 +5,18 @@ from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, rounded_down, rounded_up, smaller, total
+from busplan.elementwise import (
+    Number,
+    choose,
+    from_table,
+    is_everywhere,
+    is_off,
+    larger,
+    rounded_down,
+    rounded_up,
+    smaller,
+    total,
+)
 from busplan.sourced import Constants, cached
 
 c: Final = Constants(

@@ -14,9 +14,11 @@ from busplan.sections.profile import Profile
 BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 Tolerance = Annotated[float, Field(ge=0, le=0.05, allow_inf_nan=False)]
 if TYPE_CHECKING:
-    ProtocolName = AdapterName = str
+    ProtocolName = str
+    AdapterName = str
 else:
-    ProtocolName, AdapterName = Literal[tuple(PROTOCOLS)], Literal[ADAPTERS]
+    ProtocolName = Literal[tuple(PROTOCOLS)]
+    AdapterName = Literal[ADAPTERS]
 
 
 def _table_or_name(value: object) -> str:
@@ -161,7 +163,7 @@ class PolledBus(BusSection):
         | None
     ) = Field(
         default=None,
-        description=f"Adapter between host and bus: {listed(ADAPTERS, 'or')}, or a table [bus.adapter]; without it none",
+        description=f"Adapter of the host: {listed(ADAPTERS, 'or')}, or a table [bus.adapter]; without it none",
         examples=["ftdi-low-latency"],
     )
     host_us: TimeUs = Field(

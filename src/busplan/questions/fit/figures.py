@@ -434,7 +434,14 @@ def _types(register: BusFigures) -> Mapping[str, type]:
     return {figure.key: TYPES[figure.sort] for figure in register.capacity if figure.sort in TYPES}
 
 
-_CERTAINTY_KEYS: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "least_required_us", "safe_min_period_us")
+_CERTAINTY_KEYS: Final = (
+    "bias_us",
+    "margin_corrected_us",
+    "uncertainty_us",
+    "safe_required_us",
+    "least_required_us",
+    "safe_min_period_us",
+)
 """Figures of a cycle that only the timing model that decides has."""
 
 
