@@ -125,7 +125,7 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
     ways = {
         "profibus-dp": ["exchange"],
         "modbus-rtu": ["exchange", "single"],
-        "dynamixel-2": ["sync", "single"],
+        "dynamixel-2": ["sync", "fast-sync", "single"],
         "feetech": ["sync", "single"],
         "worldfip": ["single"],
     }
@@ -141,7 +141,9 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
                 "requests": st.sampled_from(ways[protocol]),
                 "reads": st.integers(1, 3),
                 "writes": st.integers(1, 3),
-                "adapter_us": st.one_of(st.just(0.0), st.floats(0.0, 2000.0)),
+                "adapter": st.sampled_from(
+                    ["none", "ftdi-low-latency", "ftdi", {"timer_us": 500.0, "packet_bytes": 8}]
+                ),
                 "host_us": st.floats(0.0, 200.0),
                 "global_control": st.just(is_profibus),
                 "retries": st.integers(0, 2),

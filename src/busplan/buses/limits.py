@@ -311,14 +311,16 @@ class Starter(NamedTuple):
     """Meaning of execution.base_us."""
     table: str = ""
     """Keys of a published execution time, in place of a guess."""
+    tables: Mapping[str, str] = {}
+    """The same by variant, where one has its own."""
     more: str = ""
     """Commented lines at the end of the profile."""
 
-    @property
-    def execution(self) -> str:
-        """Keys of a node's execution time, which is assumed."""
+    def execution(self, variant: str = "") -> str:
+        """Keys of a node's execution time, which is assumed unless the kind, or the variant, has a better one."""
         return (
-            self.table
+            self.tables.get(variant)
+            or self.table
             or f"""\
 kind = "linear"
 grade = "assumed"          # between 0 and twice its value

@@ -167,7 +167,7 @@ def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) ->
         axes=group.axes,
         payload=_payload(group, bytes_per_axis=machine.bytes_per_axis),
         measure=starter.measure.format(file=file, group=of_group),
-        execution=starter.execution,
+        execution=starter.execution(machine.variant),
         more=starter.node,
     )
 
