@@ -14,6 +14,7 @@ from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject
 from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller
 from busplan.english import told_apart
+from busplan.sections.base import beside
 from busplan.sourced import Grade
 
 Value = int | float | str
@@ -40,11 +41,11 @@ class Safety(NamedTuple):
     """Values of keys after a bus reset, until somebody sets them again."""
 
 
-KeyRole = Literal["cable", "clock", "host", "pipeline"]
+KeyRole = Literal["cable", "clock", "host", "pipeline", "wake-up"]
 """Part of a machine that a key of any kind stands for.
 
-It is the length of a cable [m], a common clock of the nodes, the host's own time in the cycle, or the whole periods
-that the host adds to a loop.
+It is the length of a cable [m], a common clock of the nodes, the host's own time from what it receives to what it
+sends, the whole periods that the host adds to a loop, or the latest start of a cycle by the host.
 """
 
 
@@ -265,6 +266,43 @@ class NothingUnknown(Limit):
     def perhaps(self, network: Network) -> Number:
         """All of them: what is not known may be well."""
         return self.value(network)
+
+
+class WakeUp(NothingUnknown):
+    """The latest wake-up of measured cycles is no bound: the next cycle may be later.
+
+    Of exchangeable cycles each is as likely the latest. So the next n cycles hold on average n / (n + 1), about one,
+    that is later than the worst of n measured ones. Who accepts one missed cycle in as many accepts that; what happens
+    in more cycles than were measured, no recording shows.
+    """
+
+    key = "wake_up"
+    label = "the host's wake-up"
+    way_out = "limits.missed_cycles = 1 accepts one later cycle in as many as were measured"
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+        """Key of the latest start of a cycle by the host."""
+
+    def _measured(self, network: Network) -> tuple[Number, Number | None]:
+        """The latest start [us], and the number of cycles of which it is the worst; None where it is a bound."""
+        bus = network.profile.bus
+        name = self.place.removeprefix("bus.")
+        return getattr(bus, name), getattr(bus, beside(name, "cycles"))
+
+    def value(self, network: Network) -> Number:
+        """Whether a measured worst stands for a bound, and nobody accepts a later cycle, 1 or 0."""
+        latest_us, cycles = self._measured(network)
+        if cycles is None:
+            return 0
+        is_accepted = choose(network.profile.limits.missed_cycles >= 1, 1, 0)
+        return choose(latest_us > 0, 1 - is_accepted, 0)
+
+    def words(self, network: Network) -> str:
+        """Number of the measured cycles, and what accepts them."""
+        latest_us, cycles = self._measured(network)
+        worst = f"{self.place} = {latest_us:g} is the worst of {int(cycles or 0):,} measured cycles, no bound"
+        return f"{worst}; limits.missed_cycles = 1 accepts one later cycle in as many"
 
 
 class ShareOfPeriod(Limit):

@@ -36,6 +36,7 @@ from busplan.buses.limits import (
     ShareOfPeriod,
     Starter,
     TimingModel,
+    WakeUp,
     nodes_limit,
 )
 from busplan.buses.network import Group, Network
@@ -145,6 +146,7 @@ LIMITS: Final = (
     ),
     BeforeSync0(),
     SyncWindow(),
+    WakeUp("bus.master_jitter_us"),
 )
 
 
@@ -231,7 +233,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="move the other devices to a second segment"),
         "bus.master_us": Key("T_master", role="host"),
-        "bus.master_jitter_us": Key("J"),
+        "bus.master_jitter_us": Key("J", role="wake-up"),
         "bus.mailbox_polls": Key("polls"),
         "bus.mailbox_bytes": Key("B", "MAILBOX_BYTES"),
         "bus.sync_shift": Key("shift", "SYNC_SHIFT", meaning="drives act, and sample, later"),

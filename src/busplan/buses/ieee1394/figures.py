@@ -62,7 +62,17 @@ def _term(name: str, reference: str, meaning: str, ink: Ink, letter: str, *, key
 
 
 _STARTS: Final = "cycle start packets, and the isochronous traffic after them"
+JITTER: Final = Figure(
+    "cycle_jitter_us",
+    "J",
+    "profile",
+    "how late the host may start a cycle",
+    "host's jitter",
+    ink="contention",
+    letter="J",
+)
 TERMS: Final = (
+    JITTER,
     _term("cycle_starts", "cycle", _STARTS, "sync", "C", key="{}_us"),
     SYNC,
     _term("arbitration", by(eq.arbitration_phase_us), "all arbitration of a cycle", "contention", "A"),
@@ -250,6 +260,7 @@ class Ieee1394Figures(OwnFigures):
     reads_us: float
     writes_us: float
     nodes_eq11: float | None
+    cycle_jitter_us: float
     cycle_starts_us: float
     sync_us: float
     cycle_arbitration_us: float

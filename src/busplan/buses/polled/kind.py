@@ -16,6 +16,7 @@ from busplan.buses.limits import (
     Setting,
     Starter,
     TimingModel,
+    WakeUp,
 )
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
@@ -57,6 +58,7 @@ LIMITS: Final = (
         lambda network: protocol_of(network.profile.bus).max_bit_rate_kbit_s,
         way_out="use a lower bit rate",
     ),
+    WakeUp("bus.master_jitter_us"),
 )
 
 
@@ -99,8 +101,10 @@ class Polled(Bus):
         "bus.clock_tolerance": Key("df"),
         "bus.adapter_us": Key("t_adapter", grade="assumed"),
         "bus.host_us": Key("t_host", role="host"),
+        "bus.master_jitter_us": Key("J", role="wake-up"),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
+    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.master_jitter_us": 0.0},)
     evidence_data = ("polled",)
 
     def title_of(self, network: Network) -> str:
@@ -136,11 +140,12 @@ class Polled(Bus):
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """Perturbations: a slower adapter, and one more repeated request."""
+        """Perturbations: a slower adapter, a later wake-up, and one more repeated request."""
         bus = network.profile.bus
         no_timeout = "" if protocol_of(bus).has_token or bus.timeout_us is not None else "bus.timeout_us is not given"
         return (
             Perturbation("adapter +100 us", {"bus.adapter_us": bus.adapter_us + 100}),
+            Perturbation("master's jitter +10 us", {"bus.master_jitter_us": bus.master_jitter_us + 10}),
             Perturbation("one more retry", {"bus.retries": bus.retries + 1}, why_not=no_timeout),
         )
 
