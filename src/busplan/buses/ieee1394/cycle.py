@@ -285,7 +285,8 @@ class CycleWithStarts(BusCycle):
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
         late, *rounds = map(tuple, super().each_round())
-        yield late
+        if self._late_us:
+            yield late
         for round_ in rounds:
             while sent < starts and now_us >= sent * c.CYCLE_US:
                 yield start
