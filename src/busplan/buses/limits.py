@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, unique
 from functools import reduce
@@ -278,7 +278,7 @@ class WakeUp(NothingUnknown):
 
     key = "wake_up"
     label = "the host's wake-up"
-    way_out = "limits.missed_cycles = 1 accepts one later cycle in as many as were measured"
+    way_out = "limits.missed_cycles = 1 accepts one later cycle in as many"
 
     def __init__(self, place: str) -> None:
         self.place = place
@@ -299,10 +299,9 @@ class WakeUp(NothingUnknown):
         return choose(latest_us > 0, 1 - is_accepted, 0)
 
     def words(self, network: Network) -> str:
-        """Number of the measured cycles, and what accepts them."""
+        """The latest start, and the number of the measured cycles."""
         latest_us, cycles = self._measured(network)
-        worst = f"{self.place} = {latest_us:g} is the worst of {int(cycles or 0):,} measured cycles, no bound"
-        return f"{worst}; limits.missed_cycles = 1 accepts one later cycle in as many"
+        return f"{self.place} = {latest_us:g} is the worst of {int(cycles or 0):,} measured cycles, no bound"
 
 
 class ShareOfPeriod(Limit):
@@ -329,10 +328,8 @@ class Starter(NamedTuple):
 
     bus: str
     """Section [bus] in TOML, without its nodes and its host."""
-    hosts: Mapping[str, str] = {}
-    """Hosts to choose from, each with its lines of [bus]; none where the host plays no part."""
     host: str = ""
-    """Host of a new profile, unless another is asked for."""
+    """Host of a new profile, unless another is asked for; empty where the profile says nothing of its host."""
     period: str = "1ms"
     """Communication period, unless another is asked for."""
     slice_ratio: str = "1            # the whole period is for communication"
@@ -343,6 +340,8 @@ class Starter(NamedTuple):
     """Commented lines of a node, for keys that have no right default."""
     variants: Mapping[str, str] = {}
     """Other buses of the kind by name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
+    without_wake_up: tuple[str, ...] = ()
+    """Variants that have no key of the host's wake-up."""
     rate: str = ""
     """Key of [bus] with a bit rate that a user is asked for; empty where there is only one."""
     base: str = "time of a node's work in each cycle"
@@ -365,11 +364,15 @@ per_byte_us = 0.1          # assumed: time per byte
 """
         )
 
-    def section(self, host: str | None = None, variant: str = "") -> str:
-        """Section [bus] with the lines of a host, by default `host`, and those of a variant, or the variant's own."""
+    def section(self, host: Iterable[str], variant: str) -> str:
+        """Section [bus] with lines on the host and those of a variant, or the variant's own section."""
         more = self.variants.get(variant, "")
         bus, more = (more, "") if more.startswith("[bus]") else (self.bus, more)
-        return "\n".join(filter(None, (bus, self.hosts.get(host or self.host), more)))
+        given = tuple(host)
+        # A commented key is a proposal.
+        proposed = tuple(f"# {line.partition('=')[0]}=" for line in given)
+        kept = (line for line in bus.splitlines() if not line.startswith(proposed))
+        return "\n".join(filter(None, (*kept, *given, more)))
 
 
 @unique

@@ -70,7 +70,7 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
     # The host keeps its share of the period, whatever the kind's default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
     bus = kind_named(kind)
-    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section(variant=variant))
+    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.new_section(variant=variant))
     cables_m = _cables_m(profile)
     if cables_m and cable_key:
         left_out = tuple(key for key in left_out if key not in cables_m)

@@ -98,6 +98,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
             "can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000",
             "can-motors": _MOTORS,
         },
+        without_wake_up=("can-motors",),
         rate="bit_rate_kbit_s",
         more="""\
 # What else goes over the bus? Without it the load is too small. For example of CANopen nodes, each on its own:
