@@ -1,6 +1,7 @@
 """A host that starts cycles late: its cycle beside a simulated host, and a measured worst, which is no bound."""
 
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -63,7 +64,9 @@ def test_a_cycle_takes_as_much_longer_as_it_may_start_late(kind: Kind, us: float
     assert late.required_us == pytest.approx(punctual.required_us + kind.share * us, rel=1e-12)
     assert sum(term.us for term in late.terms) == pytest.approx(late.required_us, rel=1e-12)
     events = busplan.timeline(with_jitter(kind, us)).to_dict()["events"]
-    assert sum(event["duration_us"] for event in events if event["kind"] != "idle") == pytest.approx(late.required_us, rel=1e-9)
+    assert sum(event["duration_us"] for event in events if event["kind"] != "idle") == pytest.approx(
+        late.required_us, rel=1e-9
+    )
 
 
 @given(st.integers(1, 400), st.integers(1, 400), st.lists(st.booleans(), min_size=20, max_size=20), st.integers(0, 8))
@@ -76,7 +79,7 @@ def test_a_late_host_never_meets_its_next_cycle_where_the_plan_fits(
     planned = decided(with_jitter(kind, float(late_us), **changes))
     # The host wakes at each multiple of the period, or later; its cycle then runs to its end.
     starts = [number * 10.0 * period_us + late_us * late for number, late in enumerate([True, False, *is_late])]
-    meets = any(start + lasts_us > later + 1e-9 for start, later in zip(starts, starts[1:], strict=False))
+    meets = any(start + lasts_us > later + 1e-9 for start, later in pairwise(starts))
     assert meets is (not planned.fits)
 
 

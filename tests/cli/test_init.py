@@ -178,7 +178,16 @@ def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> 
 def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
     # What is no number is asked for again.
     code, said = answered(
-        tmp_path, b"myrinet\n", b"FireWire\n", b"many\n", b"0\n", b"5\n", b"\n", b"12\n", b"stock\n", arguments=("--axes", "10")
+        tmp_path,
+        b"myrinet\n",
+        b"FireWire\n",
+        b"many\n",
+        b"0\n",
+        b"5\n",
+        b"\n",
+        b"12\n",
+        b"stock\n",
+        arguments=("--axes", "10"),
     )
     assert code == 0
     assert said.index("myrinet: no kind of bus") < said.index("Nodes, the host")

@@ -117,7 +117,8 @@ def _keys(bus: Bus, role: KeyRole) -> dict[str, str]:
         for part in _BESIDE:
             # In a section of the host alone they stand without the name of its time.
             names = [one for one in (beside(name, part), part) if one in model.model_fields]
-            keys |= {part: f"{section}.{one}" for one in names[:1]}
+            if names:
+                keys[part] = f"{section}.{names[0]}"
     return keys
 
 

@@ -93,8 +93,8 @@ class CanBus(BusSection):
     )
     sync_jitter_cycles: Count | None = Field(
         default=None,
-        description="Measured cycles of which sync_jitter_us is the worst; it is no bound then, and a plan is shown to "
-        "fit only where limits.missed_cycles accepts a later one. Without it sync_jitter_us is a bound",
+        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
         examples=[900_000],
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(

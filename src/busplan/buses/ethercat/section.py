@@ -96,8 +96,8 @@ class EthercatBus(BusSection):
     )
     master_jitter_cycles: Count | None = Field(
         default=None,
-        description="Measured cycles of which master_jitter_us is the worst; it is no bound then, and a plan is shown to "
-        "fit only where limits.missed_cycles accepts a later one. Without it master_jitter_us is a bound",
+        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
         examples=[900_000],
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(

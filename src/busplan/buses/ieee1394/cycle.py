@@ -206,7 +206,7 @@ class CycleWithStarts(BusCycle):
 
     @property
     def required_time_slice_us(self) -> Number:
-        """Time slice that a node needs, equation (2), with what the paper has not: jitter, cycle starts, retries [us]."""
+        """Time slice that a node needs, equation (2), with jitter, cycle starts and retries beside it [us]."""
         terms, nodes = self.by_term, self.network.nodes
         slice_us = required_time_slice_us(
             self.reads_us,

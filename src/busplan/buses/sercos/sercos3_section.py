@@ -51,8 +51,8 @@ class Sercos3Bus(BusSection):
     )
     master_jitter_cycles: Count | None = Field(
         default=None,
-        description="Measured cycles of which master_jitter_us is the worst; it is no bound then, and a plan is shown to "
-        "fit only where limits.missed_cycles accepts a later one. Without it master_jitter_us is a bound",
+        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
         examples=[900_000],
     )
     master_delay_us: TimeUs = Field(
@@ -73,7 +73,7 @@ class Sercos3Bus(BusSection):
     )
     ring_grade: Literal["measured", "published", "assumed"] | None = Field(
         default=None,
-        description='Grade of device_delay_us, gap_bytes, and master_jitter_us without master_jitter_cycles; '
+        description="Grade of device_delay_us, gap_bytes, and master_jitter_us without master_jitter_cycles; "
         'unless "measured", the published ranges are their doubt',
         examples=["measured"],
     )

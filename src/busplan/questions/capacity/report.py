@@ -119,9 +119,7 @@ def _rests_on_table(verdict: Verdict) -> blocks.Table:
     """Table of what the verdict takes for granted: what the profile does not give, and a measured wake-up."""
     rows = (blocks.TableRow((part.words, blocks.Code(part.key) if part.key else "none")) for part in verdict.rests_on)
     columns = blocks.TableColumn("premise", kind="words"), blocks.TableColumn("key", kind="words")
-    return blocks.Table(
-        columns, tuple(rows), blocks.Sentence(("Premises of the verdict",))
-    )
+    return blocks.Table(columns, tuple(rows), blocks.Sentence(("Premises of the verdict",)))
 
 
 def _groups_table(answer: CapacityAnswer) -> blocks.Table:
