@@ -74,7 +74,11 @@ def test_a_late_host_never_meets_its_next_cycle_where_the_plan_fits(
     late_us: int, period_us: int, is_late: list[bool], nodes: int
 ) -> None:
     kind = next(kind for kind in KINDS if kind.profile == "profibus-drives-6")
-    changes = {"bus__nodes": nodes + 1, "cycle__nonperiodic_us": 0.0, "cycle__period_us": 10.0 * period_us}
+    changes: dict[str, Any] = {
+        "bus__nodes": nodes + 1,
+        "cycle__nonperiodic_us": 0.0,
+        "cycle__period_us": 10.0 * period_us,
+    }
     lasts_us = decided(with_jitter(kind, 0.0, **changes)).required_us
     planned = decided(with_jitter(kind, float(late_us), **changes))
     # The host wakes at each multiple of the period, or later; its cycle then runs to its end.
@@ -98,7 +102,7 @@ def test_commands_come_as_late_and_samples_scatter(kind: Kind) -> None:
 def test_a_measured_worst_is_no_bound(kind: Kind) -> None:
     bound = decided(with_jitter(kind, 5.0, cycle__period_us=64_000.0))
     assert bound.verdict == "fits"
-    measured = {"cycles": 900_000, "cycle__period_us": 64_000.0}
+    measured: dict[str, Any] = {"cycles": 900_000, "cycle__period_us": 64_000.0}
     found = decided(with_jitter(kind, 5.0, **measured))
     assert (found.verdict, found.not_shown, found.exceeded) == ("not shown to fit", ("wake_up",), ())
     (verdict,) = busplan.capacity(with_jitter(kind, 5.0, **measured)).verdicts
@@ -132,7 +136,7 @@ def test_the_gate_reports_it_at_its_key(tmp_path: Path) -> None:
     place = text.splitlines().index(next(line for line in text.splitlines() if line.startswith("sync_jitter_us"))) + 1
     (finding,) = [one.finding for one in busplan.check(path, circle=False).findings if one.finding.code == "BP114"]
     assert (finding.key, finding.line) == ("bus.sync_jitter_us", place)
-    assert "limits.missed_cycles = 1" in finding.help
+    assert "limits.missed_cycles = 1" in str(finding.help)
 
 
 @pytest.mark.parametrize("kind", kind_names())
@@ -152,7 +156,9 @@ def test_a_new_profile_has_the_host_that_is_asked_for(kind: str) -> None:
 def test_the_hosts_are_those_that_were_measured() -> None:
     # Longest periods of a 2 ms loop over 30 minutes, in ms.
     longest_ms = {"real-time": 2.78, "low-latency": 3.21, "stock": 237.0}
-    found = {name: (host.jitter_us, host.jitter_cycles) for name, host in hosts().items() if host.jitter_us}
+    found: dict[str, Any] = {
+        name: (host.jitter_us, host.jitter_cycles) for name, host in hosts().items() if host.jitter_us
+    }
     assert found == {name: (pytest.approx(1000 * (ms - 2)), 30 * 60 * 500) for name, ms in longest_ms.items()}
 
 
