@@ -82,7 +82,7 @@ def test_equation_2_adds_up_every_term_of_the_cycle(make: Make) -> None:
     both = "CTS + arbitration + data + acknowledge + execution + worst extra + idle"
     terms = {
         "paper": f"{both} + T_npd",
-        "standard": f"cycle starts + {both} + host + retries + T_npd",
+        "standard": f"J + cycle starts + {both} + host + retries + T_npd",
     }
     for model, formula in terms.items():
         needed = derived(make(), "required_us", timing_model=model).steps[-1]
