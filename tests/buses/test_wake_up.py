@@ -15,6 +15,7 @@ from busplan.buses.hosts import hosts
 from busplan.profile.starter import Machine, machine_text, shared_out
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.circle_setup import jitter_us
+from busplan.questions.fit.graded import given as given_as
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import beside
 
@@ -143,6 +144,10 @@ def test_the_gate_reports_it_at_its_key(tmp_path: Path) -> None:
     (finding,) = [one.finding for one in busplan.check(path, circle=False).findings if one.finding.code == "BP114"]
     assert (finding.key, finding.line) == ("bus.sync_jitter_us", place)
     assert "limits.missed_cycles = 1" in str(finding.help)
+    # Another machine's worst is assumed of this one; its own is measured.
+    assert given_as(busplan.load_profile(path), "bus.sync_jitter_us").grade == "assumed"
+    path.write_text(text.replace("# assumed: latest start", "# latest start"))
+    assert given_as(busplan.load_profile(path), "bus.sync_jitter_us").grade == "measured"
 
 
 @pytest.mark.parametrize("kind", kind_names())
