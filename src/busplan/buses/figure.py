@@ -7,7 +7,7 @@ are in this module; a kind of bus adds its own.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final, Literal, NamedTuple, Protocol, Self
+from typing import Any, Final, Literal, NamedTuple, Protocol, Self, get_args
 
 from busplan.buses import time_slice
 from busplan.errors import BusplanError
@@ -39,6 +39,9 @@ Ink = Literal[
     "refused",
 ]
 """Colour of a stretch of time, or of a setting of a map, by its meaning to a reader."""
+Wait = Literal["wire", "nodes", "adapter", "host"]
+"""What a cycle waits for; nodes are also devices and drives."""
+WAITS: Final[tuple[Wait, ...]] = get_args(Wait)
 
 _UNITS: Final = {
     "_mm_per_min": "mm/min",
@@ -86,6 +89,8 @@ class Figure(NamedTuple):
     """Letter and `ink` in drawings, where the figure is a part of the slice."""
     is_hexadecimal: bool = False
     """Whether tables write it as 0x1f."""
+    waits_for: Wait = "wire"
+    """What the cycle waits for in a term."""
 
     @property
     def unit(self) -> str:

@@ -17,7 +17,7 @@ from busplan.buses.figure import by_key
 from busplan.elementwise import Traced
 from busplan.profile.kinds import cycle_keys
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
-from busplan.questions.fit.figures import figures, node_counts
+from busplan.questions.fit.figures import cycle_figures, figures, node_counts
 from busplan.questions.fit.network import changed, model_names, network_of
 from tests.registers import at_least, shipped_names
 
@@ -62,6 +62,8 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
         for term in cycle.terms:
             assert fsum(of_events.pop(term.key, [])) == pytest.approx(term.us, rel=1e-12, abs=1e-12)
         assert not of_events
+        waits_us = cycle_figures(network, model=model).waits_us
+        assert fsum(waits_us.values()) == pytest.approx(cycle.required_us, rel=1e-12)
 
 
 @KINDS

@@ -14,6 +14,7 @@ from busplan.buses.figure import (
     Figure,
     Ink,
     OwnFigures,
+    Wait,
     by,
 )
 from busplan.buses.ieee1394 import equations as eq
@@ -56,9 +57,9 @@ SYNC: Final = Figure(
 )
 
 
-def _term(name: str, reference: str, meaning: str, ink: Ink, letter: str, *, key: str = "cycle_{}_us") -> Figure:
-    words = name.replace("_", " ")
-    return Figure(key.format(name), words, reference, meaning, words, ink=ink, letter=letter)
+def _term(name: str, reference: str, meaning: str, ink: Ink, letter: str, waits_for: Wait = "wire") -> Figure:
+    words, key = name.replace("_", " "), f"cycle_{name}_us"
+    return Figure(key, words, reference, meaning, words, ink=ink, letter=letter, waits_for=waits_for)
 
 
 _STARTS: Final = "cycle start packets, and the isochronous traffic after them"
@@ -70,20 +71,28 @@ JITTER: Final = Figure(
     "host's jitter",
     ink="contention",
     letter="J",
+    waits_for="host",
 )
 TERMS: Final = (
     JITTER,
-    _term("cycle_starts", "cycle", _STARTS, "sync", "C", key="{}_us"),
+    Figure("cycle_starts_us", "cycle starts", "cycle", _STARTS, "cycle starts", ink="sync", letter="C"),
     SYNC,
     _term("arbitration", by(eq.arbitration_phase_us), "all arbitration of a cycle", "contention", "A"),
     _term("data", by(eq.data_phase_us), "all packets of a cycle", "request", "D"),
     _term("acknowledge", _ACKNOWLEDGE, "all acknowledges of a cycle", "acknowledge", "K"),
     _term("hold", "profile", "bus held from acknowledges to concatenated responses", "response", "B"),
-    _term("execution", "profile", "all execution of a cycle", "work", "E"),
-    _term("worst_extra", "profile", "time of the slowest executions beyond the execution time", "work", "X"),
+    _term("execution", "profile", "all execution of a cycle", "work", "E", "nodes"),
+    _term(
+        "worst_extra",
+        "profile",
+        "time of the slowest executions beyond the execution time",
+        "work",
+        "X",
+        waits_for="nodes",
+    ),
     _term("idle", "idle", "all idle bus of the gaps, beside execution", "long-gap", "G"),
-    _term("host", "profile", "the host's own time beyond the gaps", "contention", "H"),
-    _term("retries", "profile", "busy retries of the longest request", "request", "T", key="{}_us"),
+    _term("host", "profile", "the host's own time beyond the gaps", "contention", "H", "host"),
+    _term("retries", "profile", "busy retries of the longest request", "request", "T")._replace(key="retries_us"),
     NONPERIODIC,
 )
 """Terms of the cycle in the order of the wire."""

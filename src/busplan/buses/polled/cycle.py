@@ -31,6 +31,7 @@ TERMS: Final = (
         "master's jitter",
         ink="contention",
         letter="J",
+        waits_for="host",
     ),
     Figure("cycle_once_us", "T_once", _WIRE, "token and GAP, once a cycle", "token and GAP", ink="sync", letter="T"),
     Figure(
@@ -45,6 +46,7 @@ TERMS: Final = (
         "turn-around",
         ink="work",
         letter="W",
+        waits_for="nodes",
     ),
     Figure("cycle_answer_us", "T_ans", _WIRE, "answers of the nodes", "answers", ink="in", letter="A"),
     Figure("cycle_gap_us", "T_gap", _WIRE, "idle bus before and after telegrams", "idle times", ink="gap", letter="G"),
@@ -56,10 +58,18 @@ TERMS: Final = (
         "adapter",
         ink="contention",
         letter="U",
+        waits_for="adapter",
     ),
     Figure("cycle_retry_us", "T_retry", "profile", "repeated requests", "retries", ink="contention", letter="Y"),
     Figure(
-        "cycle_host_us", "T_host", "profile", "the host between feedback and commands", "host", ink="work", letter="H"
+        "cycle_host_us",
+        "T_host",
+        "profile",
+        "the host between feedback and commands",
+        "host",
+        ink="work",
+        letter="H",
+        waits_for="host",
     ),
     NONPERIODIC,
 )

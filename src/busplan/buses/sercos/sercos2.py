@@ -84,6 +84,7 @@ TERMS: Final = (
         "wait for drives",
         ink="work",
         letter="W",
+        waits_for="nodes",
     ),
     NONPERIODIC,
 )

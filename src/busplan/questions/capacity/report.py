@@ -178,6 +178,7 @@ def _verdict(answer: CapacityAnswer, verdict: Verdict) -> blocks.Record:
         **sentences.safety_record(figures),
         **_chosen(figures, "available_us", "required_us", "margin_us"),
         **_chosen(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
+        "waits": {f"{wait}_us": us for wait, us in verdict.cycle.waits_us.items()} if verdict.cycle else {},
         "uncertainty_parts": uncertainty_parts(verdict.cycle) if verdict.cycle else [],
         "reserve": answer.profile.limits.reserve,
         "rests_on": [{"key": part.key or None, "words": part.words} for part in verdict.rests_on],

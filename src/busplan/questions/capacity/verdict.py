@@ -404,7 +404,9 @@ def _basis(verdict: Verdict, tested: Tested) -> Iterator[_Line]:
 
 
 def _largest(cycle: CycleFigures) -> Iterator[_Line]:
-    """The largest term and the largest doubt of a cycle."""
+    """What a cycle waits for, its largest term and its largest doubt."""
+    waits = (f"{wait} {known_text(us, cycle.uncertainty_us)} us" for wait, us in cycle.waits_us.items() if us)
+    yield "waits for", blocks.Sentence((", ".join(waits),))
     term = max(cycle.terms, key=lambda term: term.us)
     us = known_text(term.us, cycle.uncertainty_us)
     yield "largest term", blocks.Sentence((f"{cycle.bus_figures.term_label(term.name)}, {us} us",))

@@ -8,7 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.figure import BusFigures, OwnFigures, Sort
+from busplan.buses.figure import WAITS, BusFigures, OwnFigures, Sort, Wait
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
@@ -145,6 +145,12 @@ class CycleFigures(FitFigures):
     safe_min_period_us: float | None
     doubts: tuple[Doubt, ...]
     """Components of the uncertainty; empty under a timing model that does not decide."""
+
+    @property
+    def waits_us(self) -> dict[Wait, float]:
+        """What the cycle waits for, and how long [us]: wire, nodes, adapter, host; all add up to `required_us`."""
+        waits = {figure.key: figure.waits_for for figure in self.bus_figures.terms}
+        return {wait: sum(term.us for term in self.terms if waits[term.key] == wait) for wait in WAITS}
 
     @classmethod
     def of(cls, figures: FitFigures) -> Self:
