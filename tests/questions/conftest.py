@@ -70,6 +70,7 @@ OF_STANDARD: dict[str, st.SearchStrategy[Any]] = {
     "cycle__schedule": st.sampled_from(["individual", "broadcast"]),
     "cycle__broadcast_request": st.sampled_from(["isochronous", "priority", "timed"]),
     "host__transaction_us": st.one_of(st.just(0.0), st.floats(0.0, 60.0)),
+    "bus__sync_jitter_us": st.one_of(st.just(0.0), st.floats(0.0, 300.0)),
     "node__read_response": st.sampled_from(["split", "concatenated"]),
     "node__write_response": st.sampled_from(["split", "unified"]),
     "node__response_us": st.floats(0.0, 1.63),
@@ -145,6 +146,7 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
                     ["none", "ftdi-low-latency", "ftdi", {"timer_us": 500.0, "packet_bytes": 8}]
                 ),
                 "host_us": st.floats(0.0, 200.0),
+                "master_jitter_us": st.one_of(st.just(0.0), st.floats(0.0, 300.0)),
                 "global_control": st.just(is_profibus),
                 "retries": st.integers(0, 2),
                 "timeout_us": st.floats(0.0, 3000.0),

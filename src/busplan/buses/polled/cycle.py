@@ -22,7 +22,6 @@ from busplan.buses.polled.protocols import (
 )
 from busplan.elementwise import Number, is_everywhere, is_off, larger, named, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
-from busplan.sections.cycle import time_uncertainty_us
 
 if TYPE_CHECKING:
     from busplan.buses.polled.section import PolledBus
@@ -37,6 +36,16 @@ TYPICAL: Final[TimingModelName] = "typical"
 _WIRE: Final = "protocol"
 RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate", "bit rate, kbit/s", decimals=None)
 TERMS: Final = (
+    Figure(
+        "cycle_jitter_us",
+        "J",
+        "profile",
+        "how late the master may start a cycle",
+        "master's jitter",
+        ink="contention",
+        letter="J",
+        waits_for="host",
+    ),
     Figure("cycle_once_us", "T_once", _WIRE, "token and GAP, once a cycle", "token and GAP", ink="sync", letter="T"),
     Figure(
         "cycle_global_us", "T_GC", _WIRE, "broadcast that opens the cycle", "global control", ink="sync", letter="S"
@@ -101,6 +110,7 @@ class PolledFigures(OwnFigures):
     """Figures of polled buses alone, by the keys of `FIGURES`."""
 
     bit_rate_kbit_s: float
+    cycle_jitter_us: float
     cycle_once_us: float
     cycle_global_us: float
     cycle_request_us: float
@@ -115,6 +125,7 @@ class PolledFigures(OwnFigures):
 
 
 EVENTS: Final = (
+    EventKind("jitter", "master's jitter", "profile", "j", "contention"),
     EventKind("once", "token and GAP", _WIRE, "t", "sync"),
     EventKind("global", "global control", _WIRE, "s", "sync"),
     EventKind("gap", "idle time", _WIRE, ",", "gap"),
@@ -135,6 +146,7 @@ STRETCHES: Final = (
 
 PREMISES: Final = (
     Premise("bus.host_us", "an instant host", 100.0),
+    Premise("bus.master_jitter_us", "cycles without jitter", 50.0),
     Premise("bus.adapter", "no adapter", "ftdi-low-latency"),
     Premise("bus.retries", "no repeated requests", 1),
     Premise("bus.max_turn_bits", "answers as the protocol says"),
@@ -214,8 +226,9 @@ class PolledCycle(BusCycle):
         return size * self._protocol.bits_per_byte * 1000 / self.bus.bit_rate_kbit_s
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """Token, broadcast, reads, the host, writes, repeated requests, and the non-periodic window."""
-        bus = self.bus
+        """The master's jitter, token, broadcast, reads, the host, writes, retries, and the non-periodic window."""
+        bus, late = self.bus, "latest start of the cycle"
+        yield BusEvent("jitter", "cycle_jitter_us", bus.master_jitter_us, late, rests_on="bus.master_jitter_us")
         yield BusEvent("once", "cycle_once_us", self._times.once, "token and GAP")
         if bus.global_control:
             idle_us = self._times.before + self._times.silent
@@ -416,8 +429,7 @@ class PolledCycle(BusCycle):
             Doubt("bus.max_turn_bits", "turn-around of a node", answers * half_us / 2),
             Doubt("bus.clock_tolerance", "clocks of the bit rate", timed_us * self._clock_tolerance / 3**0.5),
         ]
-        host_us: Number = time_uncertainty_us(self.bus.host_us, is_guess=False)
-        doubts.append(Doubt("bus.host_us", "the host's own time", host_us))
+        doubts.append(Doubt("bus.host_us", "the host's own time", self.bus.host_doubt_us))
         if not self._protocol.is_buffered:
             execution_us: list[Number] = []
             for group in groups:
@@ -430,6 +442,10 @@ class PolledCycle(BusCycle):
             key = "node.execution" if self.network.is_uniform else "group.execution"
             doubts.append(Doubt(key, "execution time", total(execution_us)))
         return tuple(doubts)
+
+    def sync_jitter_us(self) -> Number:
+        """Half of the master's jitter: all of a cycle moves with its start [us]."""
+        return self.bus.master_jitter_us / 2
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate, and the least time of the adapter."""

@@ -16,6 +16,8 @@ from busplan.buses.limits import (
     Setting,
     Starter,
     TimingModel,
+    Value,
+    WakeUp,
 )
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
@@ -63,6 +65,7 @@ LIMITS: Final = (
         lambda network: protocol_of(network.profile.bus).max_bit_rate_kbit_s,
         way_out="use a lower bit rate",
     ),
+    WakeUp("bus.master_jitter_us"),
 )
 
 
@@ -122,9 +125,13 @@ class Polled(Bus):
         "bus.adapter.packet_bytes": Key("P", default="ADAPTER_PACKET_BYTES[ftdi]"),
         "bus.adapter.frame_us": Key("t_frame", default="ADAPTER_FRAME_US[ftdi]"),
         "bus.host_us": Key("t_host", role="host"),
+        "bus.master_jitter_us": Key("J", role="wake-up"),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
-    term_removals: ClassVar[tuple[Mapping[str, str], ...]] = ({"bus.adapter": NO_ADAPTER},)
+    term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
+        {"bus.adapter": NO_ADAPTER},
+        {"bus.master_jitter_us": 0.0},
+    )
     evidence_data = ("polled",)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
@@ -165,11 +172,12 @@ class Polled(Bus):
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """Perturbations: a longer timer of the adapter, and one more repeated request."""
+        """Perturbations: a longer timer of the adapter, a later wake-up, and one more repeated request."""
         bus = network.profile.bus
         no_timeout = "" if protocol_of(bus).has_token or bus.timeout_us is not None else "bus.timeout_us is not given"
         return (
             _longer_timer(bus),
+            Perturbation("master's jitter +10 us", {"bus.master_jitter_us": bus.master_jitter_us + 10}),
             Perturbation("one more retry", {"bus.retries": bus.retries + 1}, why_not=no_timeout),
         )
 

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from pydantic import Discriminator, Field, Tag
 
 from busplan.buses.polled.protocols import ADAPTERS, PROTOCOLS, UNLIMITED, UNLIMITED_KBIT_S, Requests, c, protocol_of
+from busplan.elementwise import Number
 from busplan.english import listed
 from busplan.sections.base import Bytes, Count, Problem, Section, TimeUs
-from busplan.sections.cycle import BusSection
+from busplan.sections.cycle import BusSection, time_uncertainty_us
 from busplan.sections.profile import Profile
 
 BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
@@ -169,6 +170,25 @@ class PolledBus(BusSection):
     host_us: TimeUs = Field(
         default=0.0, description="The host's own time in a cycle, between feedback and commands [us]", examples=[200]
     )
+    host_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None, description="Grade of host_us", examples=["measured"]
+    )
+    host_uncertainty_us: TimeUs | None = Field(
+        default=None,
+        description="Standard uncertainty of host_us; without it 10 %, where it is assumed host_us / sqrt(3) [us]",
+        examples=[5],
+    )
+    master_jitter_us: TimeUs = Field(
+        default=0.0,
+        description="Latest start of a cycle by the master; the cycle ends before the next one [us]",
+        examples=[50],
+    )
+    master_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
+    )
     global_control: bool = Field(
         default=False,
         description="Whether a broadcast opens the cycle, as Global Control of isochronous PROFIBUS",
@@ -182,6 +202,13 @@ class PolledBus(BusSection):
         description="Time that the master waits for an answer that does not come; of PROFIBUS without it T_SL [us]",
         examples=[2000],
     )
+
+    @property
+    def host_doubt_us(self) -> Number:
+        """Standard uncertainty of the host's own time [us]."""
+        if self.host_uncertainty_us is not None:
+            return self.host_uncertainty_us
+        return time_uncertainty_us(self.host_us, is_guess=self.host_grade == "assumed")
 
     def _problems(self) -> Iterator[Problem]:
         protocol = protocol_of(self)
