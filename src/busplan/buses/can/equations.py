@@ -244,6 +244,7 @@ class CanFigures(CanMessageFigures):
     cycle_sync_us: float
     cycle_wait_us: float
     cycle_feedback_us: float
+    cycle_adapter_us: float
     cycle_host_us: float
     cycle_command_us: float
     cycle_blocking_us: float
