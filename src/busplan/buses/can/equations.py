@@ -32,6 +32,8 @@ FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 SATURATED: Final = c.unchanged["SATURATED"]
 MOST_STEPS: Final = c.unchanged["MOST_STEPS"]
 
+SECOND_US: Final = 1e6
+
 KBIT_US = 1000
 """Time of a bit at 1 kbit/s [us]."""
 

@@ -8,7 +8,7 @@ from math import inf
 from typing import Final
 
 from busplan.buses.can.cycle import WORST_STUFFING, CanCycle, can_cycle
-from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
+from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, SECOND_US, c
 from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
 from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, of_node, traffic_of
 from busplan.buses.can.waiting import message_responses
@@ -254,10 +254,7 @@ def _frames_s(network: Network, *, of_messages: bool = False) -> Number:
         sent = (one for one in streams(traffic) if one.is_message or not of_messages)
         return total(one.identifiers / one.period_us for one in sent)
 
-    return _SECOND_US * traffic_of(network).ask(each_us, words="identifiers over their periods, of all frames")
-
-
-_SECOND_US: Final = 1e6
+    return SECOND_US * traffic_of(network).ask(each_us, words="identifiers over their periods, of all frames")
 
 
 class KnownPeriods(NothingUnknown):

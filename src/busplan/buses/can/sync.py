@@ -17,10 +17,10 @@ from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 class SyncCycle(PdoCycle):
     """SYNC's jitter, SYNC, the wait for the slowest node, feedback PDOs, the host, command PDOs, and the window.
 
-    The host's adapter is on both sides of the host. It holds up SYNC, too, but each by the same time: what it varies by
-    is SYNC's jitter. All nodes execute at once: feedback waits for the slowest of them, and so does the next SYNC behind the commands.
-    Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire; frames of higher
-    priorities go whenever they are queued.
+    All nodes execute at once: feedback waits for the slowest of them, and so does the next SYNC behind the commands.
+    The host's adapter comes before and behind the host. It holds up SYNC, too, each by the same time: what it varies by
+    is SYNC's jitter. Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire;
+    frames of higher priorities go whenever they are queued.
     """
 
     premises = PREMISES
