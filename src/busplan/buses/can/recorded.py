@@ -13,7 +13,7 @@ from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
 from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC
+from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
 from busplan.english import first_of, plural
@@ -200,6 +200,8 @@ class _Log:
         cycles = np.arange(periods.places[-1] + 1)
         sync_us, is_sent = np.interp(cycles, periods.places, sent.times_us), np.isin(cycles, periods.places)
         behind_us = np.full(len(cycles), -np.inf)
+        ends_us = {NAMES["read"]: np.full(len(cycles), -np.inf), NAMES["write"]: np.full(len(cycles), np.inf)}
+        came = {name: np.zeros(len(cycles)) for name in ends_us}
         lost: dict[str, list[str]] = {"missing": [], "twice": []}
         counts = Counter[str]()
         for stream in others:
@@ -209,6 +211,9 @@ class _Log:
                 every = round(stream.period_us / sync.period_us)
                 pdos = due_pdos(sync_us, times_us, every=every, is_sent=is_sent)
                 np.maximum.at(behind_us, pdos.cycles, pdos.late_us)
+                outer = np.maximum if stream.name == NAMES["read"] else np.minimum
+                outer.at(ends_us[stream.name], pdos.cycles, pdos.late_us)
+                np.add.at(came[stream.name], pdos.cycles, 1)
                 counts.update(due=pdos.due, missing=pdos.missing, twice=pdos.twice)
                 for name, notes in lost.items():
                     if number := getattr(pdos, name):
@@ -229,6 +234,37 @@ class _Log:
                 len(behind_us),
                 "cycle.period_us",
             )
+        is_whole = np.all([numbers == numbers.max() for numbers in came.values()], axis=0)
+        if self.cycle.waits_for_host and is_whole.any():
+            gaps_us = (ends_us[NAMES["write"]] - ends_us[NAMES["read"]])[is_whole]
+            yield self._host([stream for stream in others if stream.name == NAMES["write"]], gaps_us)
+
+    def _host(self, commands: Sequence[Stream], gaps_us: Floats) -> RecordedFigure:
+        """The first command behind the last feedback: a log holds the adapter, the host and the adapter in one."""
+        us, adapter_us = self.cycle.by_term, self.traffic.adapter_us
+        own_us = self.traffic.host_us + adapter_us
+        waits_us = us["cycle_blocking_us"] + us["cycle_interference_us"]
+        gap = quantile(gaps_us, self.share)
+        doubts_us = (doubt.us for doubt in self.cycle.doubts() if doubt.key.startswith("bus."))
+        found = RecordedFigure(
+            "first command after the last feedback",
+            "us",
+            _finite(own_us + waits_us + max(stream.frame_us for stream in commands)),
+            gap.value,
+            self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
+            "at most",
+            len(gaps_us),
+            "bus.host_us",
+            "planned: bus.host_read_us, bus.host_us, bus.host_write_us, the wait for other frames and its own",
+        )
+        if found.verdict == "outside":
+            # Only their sum counts, so what the adapter's keys do not give is the host's. So is what other frames add.
+            shortest = streams(replace(self.traffic, is_stuffed=False))
+            least_us = min(stream.frame_us for stream in shortest if stream.name == NAMES["write"])
+            doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
+            self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
+            self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
+        return found
 
     def _with_stamps(self, *uncertainties: float) -> float | None:
         """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""
