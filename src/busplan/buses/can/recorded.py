@@ -245,6 +245,8 @@ class _Log:
         own_us = self.traffic.host_us + adapter_us
         waits_us = us["cycle_blocking_us"] + us["cycle_interference_us"]
         gap = quantile(gaps_us, self.share)
+        # A plan that gives none of them rests on none, and is held to its cycle alone.
+        is_planned = self.network.profile.bus.model_fields_set & {"host_us", "adapter", "host_write_us", "host_read_us"}
         doubts_us = (doubt.us for doubt in self.cycle.doubts() if doubt.key.startswith("bus."))
         found = RecordedFigure(
             "first command after the last feedback",
@@ -252,7 +254,7 @@ class _Log:
             _finite(own_us + waits_us + max(stream.frame_us for stream in commands)),
             gap.value,
             self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
-            "at most",
+            "at most" if is_planned else "shown",
             len(gaps_us),
             "bus.host_us",
             "planned: bus.host_read_us, bus.host_us, bus.host_write_us, the wait for other frames and its own",
