@@ -121,8 +121,8 @@ class CanBus(BusSection):
     )
     adapter: Literal["kvaser-pcie", "candlelight", "none"] | None = Field(
         default=None,
-        description="Host's adapter by a word, for what the next three keys do not give: kvaser-pcie has times, "
-        "candlelight most frames a second; none adds nothing",
+        description="Host's adapter by a word, for what the next three keys do not give: kvaser-pcie has mean "
+        "times, candlelight most frames a second; none adds nothing",
         examples=["kvaser-pcie"],
     )
     host_write_us: TimeUs | None = Field(
