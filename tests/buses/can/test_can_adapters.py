@@ -48,6 +48,15 @@ def test_the_program_waits_once_or_for_each_request(access: str, rounds: int) ->
     assert doubts["bus.host_read_us"] == pytest.approx(rounds * READ_US / 10)
 
 
+# 4 frames of 95 us each way do not hide the adapter; they may hide the host and the nodes.
+@pytest.mark.parametrize(("period_us", "verdict"), [(870, "does not fit"), (880, "not shown to fit")])
+def test_a_burst_hides_no_adapter(period_us: float, verdict: str) -> None:
+    limits = {"limits.reserve": 0.0}
+    assert 8 * 95 + WRITE_US + READ_US == 875
+    known = busplan.load_profile(machine("burst", period_us=period_us, **GIVEN), changes=limits)
+    assert figures(known).verdict == verdict
+
+
 def test_the_word_has_the_times_that_were_measured_and_a_key_goes_before_it() -> None:
     assert terms(machine(adapter="kvaser-pcie")) == terms(machine(**GIVEN))
     assert terms(machine(adapter="kvaser-pcie", host_read_us=0))["adapter"] == WRITE_US
@@ -111,7 +120,7 @@ def test_all_frames_of_the_bus_go_through_the_adapter(most: float, exceeded: tup
 def test_a_plan_finds_the_period_that_the_adapter_carries(run: Run, tmp_path: Path) -> None:
     (tmp_path / "line.toml").write_text(text_of(machine(max_frames_s=1500)))
     card = run("capacity", "line.toml", cwd=tmp_path).stdout
-    assert "2,250 frames a second, over the 1,500 of the host's adapter" in " ".join(card.split())
+    assert "2250.0 frames a second, over the 1500.0 of the host's adapter" in " ".join(card.split())
     planned = json.loads(run("plan", "line.toml", "--free", "cycle.period_us", "--format", "json", cwd=tmp_path).stdout)
     assert "6 ms" in json.dumps(planned) or "6000" in json.dumps(planned)
     checked = run("check", "line.toml", "--no-circle", cwd=tmp_path)

@@ -462,7 +462,9 @@ def _adapter(own: Scene, random: Random) -> tuple[tuple[tuple[int, int], ...], .
         return (((read_us, write_us),) * own.traffic.nodes,) * CYCLES
 
     def each() -> tuple[int, int]:
-        return random.choice((read_us, random.randint(0, read_us))), random.choice((write_us, random.randint(0, write_us)))
+        return random.choice((read_us, random.randint(0, read_us))), random.choice(
+            (write_us, random.randint(0, write_us))
+        )
 
     return tuple(tuple(each() for _ in range(own.traffic.nodes)) for _ in range(CYCLES))
 

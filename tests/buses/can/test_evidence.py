@@ -54,9 +54,7 @@ def test_what_a_bus_had_lies_between_no_stuff_bits_and_the_most(run: Callable[..
         elif figure["method"] != "worst stuffing":
             assert abs(figure["relative_residual"]) < 0.04, figure["quantity"]
     # What verdicts say of the model.
-    errs = (
-        f"this timing model gives {100 * min(over):.0f} to {100 * max(over):.0f}% more than measured frames"
-    )
+    errs = f"this timing model gives {100 * min(over):.0f} to {100 * max(over):.0f}% more than measured frames"
     assert f"  correction      none: {errs}\n" in run("capacity", "can-servo-8", "--all").stdout
 
 

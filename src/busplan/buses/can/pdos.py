@@ -293,7 +293,7 @@ class PdoCycle(CanCycle):
         return larger(self.required_us - self.of(replace(self.traffic, queues=frozenset())).required_us, 0.0)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The execution time and longer FD frames, by half of what they change; and the host's own time."""
+        """Execution times and longer FD frames, by half of what they change; the host's own time and its adapter's."""
         swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in self.executions)
         key = "node.execution" if self.network.is_uniform else "group.execution"
         bus = self.network.profile.bus
@@ -374,7 +374,7 @@ class PdoCycle(CanCycle):
             "backlog_us": 0.0,
             "frame_us": self._in_cycle_us,
             "execution_us": us["cycle_wait_us"] + self.traffic.host_us,
-            "adapter_us": self.traffic.lag_us if is_off(us["cycle_adapter_us"]) else us["cycle_adapter_us"],
+            "adapter_us": us["cycle_adapter_us"] + self.traffic.lag_us,
         }
 
     def _loop(self) -> dict[str, Number]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
-from busplan.buses.can.due import due_pdos
+from busplan.buses.can.due import DuePdos, due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC
@@ -200,8 +200,7 @@ class _Log:
         cycles = np.arange(periods.places[-1] + 1)
         sync_us, is_sent = np.interp(cycles, periods.places, sent.times_us), np.isin(cycles, periods.places)
         behind_us = np.full(len(cycles), -np.inf)
-        ends_us = {NAMES["read"]: np.full(len(cycles), -np.inf), NAMES["write"]: np.full(len(cycles), np.inf)}
-        came = {name: np.zeros(len(cycles)) for name in ends_us}
+        came: list[tuple[Stream, DuePdos]] = []
         lost: dict[str, list[str]] = {"missing": [], "twice": []}
         counts = Counter[str]()
         for stream in others:
@@ -211,9 +210,7 @@ class _Log:
                 every = round(stream.period_us / sync.period_us)
                 pdos = due_pdos(sync_us, times_us, every=every, is_sent=is_sent)
                 np.maximum.at(behind_us, pdos.cycles, pdos.late_us)
-                outer = np.maximum if stream.name == NAMES["read"] else np.minimum
-                outer.at(ends_us[stream.name], pdos.cycles, pdos.late_us)
-                np.add.at(came[stream.name], pdos.cycles, 1)
+                came.append((stream, pdos))
                 counts.update(due=pdos.due, missing=pdos.missing, twice=pdos.twice)
                 for name, notes in lost.items():
                     if number := getattr(pdos, name):
@@ -234,13 +231,21 @@ class _Log:
                 len(behind_us),
                 "cycle.period_us",
             )
-        is_whole = np.all([numbers == numbers.max() for numbers in came.values()], axis=0)
-        if self.cycle.waits_for_host and is_whole.any():
-            gaps_us = (ends_us[NAMES["write"]] - ends_us[NAMES["read"]])[is_whole]
-            yield self._host([stream for stream in others if stream.name == NAMES["write"]], gaps_us)
+        yield from self._host(came, len(cycles))
 
-    def _host(self, commands: Sequence[Stream], gaps_us: Floats) -> RecordedFigure:
+    def _host(self, came: Sequence[tuple[Stream, DuePdos]], cycles: int) -> Iterator[RecordedFigure]:
         """The first command behind the last feedback: a log holds the adapter, the host and the adapter in one."""
+        commands = [stream for stream, _ in came if stream.name == NAMES["write"]]
+        first_us, last_us, number = np.full(cycles, np.inf), np.full(cycles, -np.inf), np.zeros(cycles)
+        for stream, pdos in came:
+            if stream.name == NAMES["write"]:
+                np.minimum.at(first_us, pdos.cycles, pdos.late_us)
+            else:
+                np.maximum.at(last_us, pdos.cycles, pdos.late_us)
+            np.add.at(number, pdos.cycles, 1)
+        gaps_us = (first_us - last_us)[number == len(came)]
+        if not (self.cycle.waits_for_host and len(gaps_us)):
+            return
         us, adapter_us = self.cycle.by_term, self.traffic.adapter_us
         own_us = self.traffic.host_us + adapter_us
         waits_us = us["cycle_blocking_us"] + us["cycle_interference_us"]
@@ -266,7 +271,7 @@ class _Log:
             doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
             self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
             self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
-        return found
+        yield found
 
     def _with_stamps(self, *uncertainties: float) -> float | None:
         """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""

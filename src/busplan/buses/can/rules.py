@@ -16,7 +16,7 @@ from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, pointwise, smaller, total, within
-from busplan.english import first_of
+from busplan.english import first_of, told_apart
 from busplan.sections.base import MAX_TIME_US
 
 
@@ -244,7 +244,8 @@ class AdapterCeiling(Limit):
     def words(self, network: Network) -> str:
         """The frames a second, and the most."""
         most = network.profile.bus.of_adapter("max_frames_s")
-        return f"the bus has {_frames_s(network):,.0f} frames a second, over the {most:,.0f} of the host's adapter"
+        sent, carried = told_apart(_frames_s(network), most)
+        return f"the bus has {sent} frames a second, over the {carried} of the host's adapter"
 
 
 def _frames_s(network: Network, *, of_messages: bool = False) -> Number:
