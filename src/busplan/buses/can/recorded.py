@@ -12,6 +12,7 @@ import numpy as np
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import DuePdos, due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
+from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
@@ -244,7 +245,7 @@ class _Log:
                 np.maximum.at(last_us, pdos.cycles, pdos.late_us)
             np.add.at(number, pdos.cycles, 1)
         gaps_us = (first_us - last_us)[number == len(came)]
-        if not (self.cycle.waits_for_host and len(gaps_us)):
+        if not (isinstance(self.cycle, PdoCycle) and self.cycle.waits_for_host and len(gaps_us)):
             return
         us, adapter_us = self.cycle.by_term, self.traffic.adapter_us
         own_us = self.traffic.host_us + adapter_us
