@@ -19,8 +19,11 @@ MAX_GROUPS: Final = 500
 TimeUs = Annotated[float, Field(ge=0, le=MAX_TIME_US, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
 Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
-GROUPS: Final = Field(strict=False, max_length=MAX_GROUPS)
-"""An array of groups: strictness would refuse TOML's array for a tuple; the tables stay strict."""
+
+
+def groups_field(most: float = MAX_GROUPS) -> Any:
+    """An array of groups: strictness would refuse TOML's array for a tuple; the tables stay strict."""
+    return Field(strict=False, max_length=int(most))
 
 
 MISSING: Final = "Field required"

@@ -147,8 +147,9 @@ def _most_identifier(network: Network) -> Number:
 def _largest_pdo(network: Network) -> Number:
     """Largest PDO, or one that is as much over the least room of any as one is over its own [bytes]."""
     largest: Number = 0
+    least_room = _least_room(network)
     for pdos in traffic_of(network).pdos:
-        largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - _least_room(network)))
+        largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - least_room))
     return largest
 
 

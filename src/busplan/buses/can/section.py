@@ -16,7 +16,6 @@ from busplan.buses.can.equations import (
 from busplan.buses.can.traffic import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
 from busplan.sections.base import (
-    GROUPS,
     MAX_TIME_US,
     MIN_STEP_US,
     MISSING,
@@ -26,6 +25,7 @@ from busplan.sections.base import (
     Section,
     TimeUs,
     TransactionKind,
+    groups_field,
 )
 from busplan.sections.cycle import (
     BusSection,
@@ -363,7 +363,7 @@ class CanProfile(Profile):
     )
     payload: CanPayload | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[CanGroup, ...], GROUPS] = Field(
+    group: Annotated[tuple[CanGroup, ...], groups_field(c.unchanged["MOST_NODES"])] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
     message: Annotated[tuple[CanMessage, ...], Field(strict=False, max_length=_MOST_MESSAGES)] = Field(

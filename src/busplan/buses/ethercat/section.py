@@ -17,7 +17,7 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.ethercat.frames import MOST_CYCLES, checked_hyperperiod
 from busplan.elementwise import Number
 from busplan.errors import BusplanError
-from busplan.sections.base import GROUPS, MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, groups_field, refused
 from busplan.sections.cycle import (
     BusSection,
     Execution,
@@ -188,7 +188,7 @@ class EthercatProfile(Profile):
     bus: EthercatBus = Field(description="The bus")
     payload: PayloadSection | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: EthercatNode | None = Field(default=None, description="One device, where nodes are alike")
-    group: Annotated[tuple[EthercatGroup, ...], GROUPS] = Field(
+    group: Annotated[tuple[EthercatGroup, ...], groups_field()] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
 

@@ -11,7 +11,7 @@ from busplan.buses.ieee1394.constants import (
     c,
 )
 from busplan.elementwise import Number, choose
-from busplan.sections.base import GROUPS, MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, groups_field, refused
 from busplan.sections.cycle import (
     BusSection,
     CycleSection,
@@ -252,7 +252,7 @@ class Ieee1394Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     node: Ieee1394Node | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[Ieee1394Group, ...], GROUPS] = Field(
+    group: Annotated[tuple[Ieee1394Group, ...], groups_field(c.unchanged["MAX_NODES"])] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
     host: Host = Field(default_factory=Host, description="The host that sends the requests")
