@@ -276,6 +276,10 @@ class BusCycle(ABC):
         """
         return 1 if at_sync else 0
 
+    def host_lag_us(self) -> float:
+        """Time of the host's adapter in a loop on the host that is in no cycle, in plain numbers [us]."""
+        return 0.0
+
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubts of inputs that are not known exactly; different inputs are independent."""
         return ()

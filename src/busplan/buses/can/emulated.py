@@ -51,8 +51,9 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     """Emulate the log of a machine that keeps its plan, but for the faults.
 
     Nodes queue their feedback T_exec behind SYNC, and up to the slowest extra time later; the host queues all commands
-    behind the last feedback and half to all of its time. SYNC comes evenly within its jitter. Messages come each by its
-    period and evenly within its jitter, a burst at once. Data are random. Stamps count from 0.
+    behind the last feedback, its adapter's time, and half to all of its own. SYNC comes evenly within its jitter.
+    Messages come each by its period and evenly within its jitter, a burst at once. Data are random. Stamps count from
+    0.
 
     Too many frames, and a fault of a cycle in a network of messages alone, raise a BusplanError.
     """
@@ -151,7 +152,7 @@ class _Machine:
         else:
             return
         if not self.left[cycle]:
-            now_us += self.random.uniform(LEAST_SHARE, 1) * self.traffic.host_us
+            now_us += self.random.uniform(LEAST_SHARE, 1) * self.traffic.host_us + self.traffic.adapter_us
             late_us = self.emulation.faults.get(LATE.name, 0.0) * (cycle in self.hit[LATE])
             yield from (self._at(now_us + late_us, command, cycle) for command in self._due("command", cycle))
 

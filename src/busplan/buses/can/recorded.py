@@ -10,10 +10,11 @@ from typing import Any, Final
 import numpy as np
 
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
-from busplan.buses.can.due import due_pdos
+from busplan.buses.can.due import DuePdos, due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
+from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC
+from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of, latest_start
 from busplan.english import first_of, plural
@@ -200,6 +201,7 @@ class _Log:
         cycles = np.arange(periods.places[-1] + 1)
         sync_us, is_sent = np.interp(cycles, periods.places, sent.times_us), np.isin(cycles, periods.places)
         behind_us = np.full(len(cycles), -np.inf)
+        came: list[tuple[Stream, DuePdos]] = []
         lost: dict[str, list[str]] = {"missing": [], "twice": []}
         counts = Counter[str]()
         for stream in others:
@@ -209,6 +211,7 @@ class _Log:
                 every = round(stream.period_us / sync.period_us)
                 pdos = due_pdos(sync_us, times_us, every=every, is_sent=is_sent)
                 np.maximum.at(behind_us, pdos.cycles, pdos.late_us)
+                came.append((stream, pdos))
                 counts.update(due=pdos.due, missing=pdos.missing, twice=pdos.twice)
                 for name, notes in lost.items():
                     if number := getattr(pdos, name):
@@ -229,6 +232,47 @@ class _Log:
                 len(behind_us),
                 "cycle.period_us",
             )
+        yield from self._host(came, len(cycles))
+
+    def _host(self, came: Sequence[tuple[Stream, DuePdos]], cycles: int) -> Iterator[RecordedFigure]:
+        """The first command behind the last feedback: a log holds the adapter, the host and the adapter in one."""
+        commands = [stream for stream, _ in came if stream.name == NAMES["write"]]
+        first_us, last_us, number = np.full(cycles, np.inf), np.full(cycles, -np.inf), np.zeros(cycles)
+        for stream, pdos in came:
+            if stream.name == NAMES["write"]:
+                np.minimum.at(first_us, pdos.cycles, pdos.late_us)
+            else:
+                np.maximum.at(last_us, pdos.cycles, pdos.late_us)
+            np.add.at(number, pdos.cycles, 1)
+        gaps_us = (first_us - last_us)[number == len(came)]
+        if not (isinstance(self.cycle, PdoCycle) and self.cycle.waits_for_host and len(gaps_us)):
+            return
+        us, adapter_us = self.cycle.by_term, self.traffic.adapter_us
+        own_us = self.traffic.host_us + adapter_us
+        waits_us = us["cycle_blocking_us"] + us["cycle_interference_us"]
+        gap = quantile(gaps_us, self.share)
+        # A plan that gives none of them rests on none, and is held to its cycle alone.
+        is_planned = self.network.profile.bus.model_fields_set & {"host_us", "adapter", "host_write_us", "host_read_us"}
+        doubts_us = (doubt.us for doubt in self.cycle.doubts() if doubt.key.startswith("bus."))
+        found = RecordedFigure(
+            "first command after the last feedback",
+            "us",
+            _finite(own_us + waits_us + max(stream.frame_us for stream in commands)),
+            gap.value,
+            self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
+            "at most" if is_planned else "shown",
+            len(gaps_us),
+            "bus.host_us",
+            "planned: bus.host_read_us, bus.host_us, bus.host_write_us, the wait for other frames and its own",
+        )
+        if found.verdict == "outside":
+            # Only their sum counts, so what the adapter's keys do not give is the host's. So is what other frames add.
+            shortest = streams(replace(self.traffic, is_stuffed=False))
+            least_us = min(stream.frame_us for stream in shortest if stream.name == NAMES["write"])
+            doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
+            self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
+            self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
+        yield found
 
     def _with_stamps(self, *uncertainties: float) -> float | None:
         """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""

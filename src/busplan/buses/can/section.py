@@ -49,6 +49,13 @@ PdoBytes = Annotated[
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 Queue = Literal["priority", "fifo", "single-buffer"]
+FramesPerSecond = Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)]
+_OF_ADAPTER: Final = {
+    "host_write_us": "ADAPTER_WRITE_US",
+    "host_read_us": "ADAPTER_READ_US",
+    "max_frames_s": "ADAPTER_FRAMES_S",
+}
+"""Constants of adapters with a word, by key."""
 _MOST_CYCLES = 1000
 _MOST_MESSAGES = 2048
 """As many as there are identifiers of 11 bits. Each is counted beside all others."""
@@ -118,6 +125,25 @@ class CanBus(BusSection):
         "host_us / sqrt(3) [us]",
         examples=[5],
     )
+    adapter: Literal["kvaser-pcie", "candlelight", "none"] | None = Field(
+        default=None,
+        description="Host's adapter by a word, for what the next three keys do not give: kvaser-pcie has mean "
+        "times, candlelight most frames a second; none adds nothing",
+        examples=["kvaser-pcie"],
+    )
+    host_write_us: TimeUs | None = Field(
+        default=None,
+        description="Time of the host's adapter and driver from the program to the wire, known to 10 % [us]",
+        examples=[100],
+    )
+    host_read_us: TimeUs | None = Field(
+        default=None, description="The same from the wire to the program [us]", examples=[100]
+    )
+    max_frames_s: FramesPerSecond | None = Field(
+        default=None,
+        description="Most frames a second that the host's adapter sends and receives, on average",
+        examples=[16_200],
+    )
     queue: Queue | None = Field(
         default=None,
         description="Order in which host and nodes send what they have queued: priority, the smallest identifier "
@@ -156,6 +182,29 @@ class CanBus(BusSection):
         if self.host_uncertainty_us is not None:
             return self.host_uncertainty_us
         return time_uncertainty_us(self.host_us, is_guess=self.host_grade in (None, "assumed"))
+
+    def adapter_key(self, name: str) -> str:
+        """Dotted key that gives a number of the adapter: its own, or that of the word."""
+        return "bus.adapter" if getattr(self, name) is None and self.adapter else f"bus.{name}"
+
+    def of_adapter(self, name: str) -> Number | None:
+        """A number of the adapter, by its key: as given, or as its word says; None where neither gives it."""
+        given: Number | None = getattr(self, name)
+        return c.get(f"{_OF_ADAPTER[name]}[{self.adapter}]") if given is None else given
+
+    @property
+    def write_us(self) -> Number:
+        """Time from the program to the wire; 0 where it is not known [us]."""
+        return self._adapter_us("host_write_us")
+
+    @property
+    def read_us(self) -> Number:
+        """Time from the wire to the program; 0 where it is not known [us]."""
+        return self._adapter_us("host_read_us")
+
+    def _adapter_us(self, name: str) -> Number:
+        us = self.of_adapter(name)
+        return 0.0 if us is None else us
 
 
 class CanPayload(PayloadSection):
@@ -299,6 +348,8 @@ _OF_CYCLE: Final = {
         "host_us",
         "host_grade",
         "host_uncertainty_us",
+        "host_write_us",
+        "host_read_us",
     ),
     "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
 }

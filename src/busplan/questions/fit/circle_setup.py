@@ -53,7 +53,7 @@ def loop_delays_us(network: Network) -> tuple[float, float]:
     whole_us = cycle.loop_periods(at_sync=cycle.takes_at_sync) * network.profile.cycle.period_us
     if cycle.takes_at_sync:
         return whole_us, whole_us
-    since_us = whole_us - cycle.sampled_us()
+    since_us = whole_us + cycle.host_lag_us() - cycle.sampled_us()
     first_us, last_us = _command_effects_us(cycle)
     return since_us + first_us, since_us + last_us
 
