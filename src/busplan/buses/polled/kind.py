@@ -101,7 +101,7 @@ class Polled(Bus):
         "bus.host_us": Key("t_host", role="host"),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
-    evidence_data = ("polled",)
+    evidence_data = ("polled", "mesa")
 
     def title_of(self, network: Network) -> str:
         """Name of the protocol; for a protocol of the user's own, the name of the kind."""
