@@ -12,8 +12,9 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject
-from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller, total
 from busplan.english import told_apart
+from busplan.sections.base import TRANSACTION_KINDS
 from busplan.sourced import Grade
 
 Value = int | float | str
@@ -524,7 +525,7 @@ def busy_words(group: Group, network: Network) -> str:
 
 def _busy_us(group: Group) -> Number:
     """Execution time of a node in a cycle: a read and a write, the slowest of each [us]."""
-    return group.read_execution_us + group.write_execution_us + 2 * group.worst_extra_us
+    return total(map(group.slowest_us, TRANSACTION_KINDS))
 
 
 def _busy_doubt_us(group: Group) -> Number:

@@ -363,7 +363,10 @@ def test_a_wrong_protocol_says_where(tmp_path: Path, old: str, new: str, words: 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"bus.protocol": "profinet"}, 'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech", "worldfip" or "mesa-hm2-eth"'),
+        (
+            {"bus.protocol": "profinet"},
+            'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech", "worldfip" or "mesa-hm2-eth"',
+        ),
         ({"bus.requests": "exchange"}, "it has sync, single"),
         ({"bus.retries": 1}, "give bus.timeout_us"),
         ({"bus.global_control": True}, "no broadcast that opens a cycle"),

@@ -10,7 +10,7 @@ from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.polled.protocols import ProtocolFigures, Requests, Times, c, protocol_of, times
-from busplan.elementwise import Number, is_everywhere, is_off, larger, total
+from busplan.elementwise import Number, choose, is_everywhere, is_off, larger, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 from busplan.sections.cycle import time_uncertainty_us
 
@@ -191,27 +191,50 @@ class PolledCycle(BusCycle):
     def _longest_us(self, group: Group) -> Number:
         protocol = self._protocol
         if self.way == "exchange":
-            return self._wire_us(protocol.exchange_request_bytes + protocol.data_bytes(group.write_bytes))
+            return self._wire_us(self._exchange_bytes(group)[0])
         if self.way == "sync":
-            return self._wire_us(protocol.sync_read_bytes + group.nodes * protocol.sync_node_bytes)
-        written = protocol.write_request_bytes + self._data("write", group)
-        return self._wire_us(larger(protocol.read_request_bytes, written))
+            asked = group.nodes_with("read") * protocol.sync_node_bytes
+            return self._wire_us(group.if_any("read", protocol.sync_read_bytes + asked))
+        read = group.if_any("read", protocol.read_request_bytes)
+        return self._wire_us(
+            larger(read, group.if_any("write", protocol.write_request_bytes + self._data("write", group)))
+        )
 
     def _times_a_cycle(self, kind: TransactionKind) -> Number:
         return self.bus.reads if kind == "read" else self.bus.writes
 
     def _data(self, kind: TransactionKind, group: Group) -> Number:
         """Mean data of a request of a node [bytes]."""
-        size = group.read_bytes if kind == "read" else group.write_bytes
+        size = group.bytes_of(kind)
         return self._protocol.data_bytes(size, self._times_a_cycle(kind))
+
+    def _exchange_bytes(self, group: Group) -> tuple[Number, Number]:
+        """Request and answer of an exchange with a node; with data one way alone, a read or a write [bytes].
+
+        A protocol without these sends an exchange that is empty in the other direction.
+        """
+        protocol = self._protocol
+        read, write = (protocol.data_bytes(group.bytes_of(kind)) for kind in TRANSACTION_KINDS)
+        sizes: tuple[Number, Number] = protocol.exchange_request_bytes + write, protocol.exchange_answer_bytes + read
+        alone: dict[TransactionKind, tuple[Number, Number]] = {
+            "write": (protocol.read_request_bytes, protocol.read_answer_bytes),
+            "read": (protocol.write_request_bytes, protocol.write_answer_bytes),
+        }
+        for missing, (request, answer) in alone.items():
+            is_there: Number = group.bytes_of(missing) > 0
+            if is_everywhere(is_there) or is_everywhere(request <= 0) or is_everywhere(answer <= 0):
+                continue
+            one_way = (request + write, answer + read)
+            sizes = choose(is_there, sizes[0], one_way[0]), choose(is_there, sizes[1], one_way[1])
+        return sizes
 
     def _execution_us(self, kind: str, group: Group) -> Number:
         """Own time of a node before it answers [us]; 0 where it answers from a buffer."""
         if self._protocol.is_buffered:
             return 0.0
-        read_us, write_us = group.read_execution_us, group.write_execution_us
-        own_us = {"read": read_us, "write": write_us}.get(kind)
-        return (larger(read_us, write_us) if own_us is None else own_us) + group.worst_extra_us
+        if kind == "read" or kind == "write":
+            return group.slowest_us(kind)
+        return reduce(larger, map(group.slowest_us, TRANSACTION_KINDS))
 
     def _answer(self, kind: str, size: Number, group: Group) -> tuple[BusEvent, ...]:
         turn_us = self._turn_us + self._execution_us(kind, group)
@@ -233,10 +256,10 @@ class PolledCycle(BusCycle):
 
     def _single(self, kind: Literal["exchange", "read", "write"], place: int, group: Group) -> Run:
         """One request for each node of a group."""
-        protocol, rounds = self._protocol, group.nodes
+        protocol = self._protocol
+        rounds = group.nodes if kind == "exchange" else group.nodes_with(kind)
         if kind == "exchange":
-            request: Number = protocol.exchange_request_bytes + protocol.data_bytes(group.write_bytes)
-            answer: Number = protocol.exchange_answer_bytes + protocol.data_bytes(group.read_bytes)
+            request, answer = self._exchange_bytes(group)
         elif kind == "read":
             request, answer = protocol.read_request_bytes, protocol.read_answer_bytes + self._data(kind, group)
             rounds = rounds * self._times_a_cycle(kind)
@@ -254,7 +277,7 @@ class PolledCycle(BusCycle):
         size = size + group.nodes * (protocol.sync_node_bytes + (0 if kind == "read" else data))
         sent = BusEvent("request", "cycle_request_us", self._wire_us(size), f"sync {kind}", transaction=kind)
         before, request, *after = self._around(kind, sent, is_answered=kind == "read")
-        rounds = self._times_a_cycle(kind)
+        rounds = group.if_any(kind, self._times_a_cycle(kind))
         if kind == "write":
             yield Run((before, request, *after), rounds)
             return
@@ -268,9 +291,9 @@ class PolledCycle(BusCycle):
         if self.way == "exchange":
             return group.nodes if kind == "read" else 0
         if kind == "read":
-            return group.nodes * self._times_a_cycle("read")
+            return group.nodes_with("read") * self._times_a_cycle("read")
         is_answered = self.way == "single" and not is_everywhere(self._protocol.write_answer_bytes <= 0)
-        return group.nodes * self._times_a_cycle("write") if is_answered else 0
+        return group.nodes_with("write") * self._times_a_cycle("write") if is_answered else 0
 
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubts of turn-around and clocks, for all nodes together; of the adapter; and of the nodes' own time.
