@@ -306,24 +306,27 @@ class Starter(NamedTuple):
     """Commented lines of a node, for keys that have no right default."""
     variants: Mapping[str, str] = {}
     """Other buses of the kind by name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
+    servos: Mapping[str, Mapping[str, tuple[int, str]]] = {}
+    """Variants whose nodes are servos of one axis: their data by direction [bytes], each with its meaning."""
     rate: str = ""
     """Key of [bus] with a bit rate that a user is asked for; empty where there is only one."""
     base: str = "time of a node's work in each cycle"
     """Meaning of execution.base_us."""
+    bases_us: Mapping[str, int] = {}
+    """Value of execution.base_us in variants whose nodes are known to take longer than others [us]."""
     table: str = ""
     """Keys of a published execution time, in place of a guess."""
     more: str = ""
     """Commented lines at the end of the profile."""
 
-    @property
-    def execution(self) -> str:
+    def execution(self, variant: str) -> str:
         """Keys of a node's execution time, which is assumed."""
         return (
             self.table
             or f"""\
 kind = "linear"
 grade = "assumed"          # between 0 and twice its value
-base_us = 20               # assumed: {self.base}
+base_us = {self.bases_us.get(variant, 20)}               # assumed: {self.base}
 per_byte_us = 0.1          # assumed: time per byte
 """
         )

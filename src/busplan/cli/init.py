@@ -3,6 +3,8 @@
 import re
 import shlex
 import sys
+from collections.abc import Mapping
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
@@ -47,10 +49,16 @@ def init_command(
         ),
     ] = None,
     nodes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]")
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4, or as --axes needs]"
+        ),
     ] = None,
     axes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node]")
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node, 1 for each servo]"
+        ),
     ] = None,
     group: Annotated[
         list[str] | None,
@@ -125,7 +133,7 @@ def init_command(
 
     if source is None:
         kind, variant = values.kind()
-        machine = _machine(kind, values)._replace(variant=variant)
+        machine = _machine(kind, variant, values)
         text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
     else:
         if values.given:
@@ -229,7 +237,7 @@ class _Values:
         return period_us
 
 
-def _machine(kind: str, values: _Values) -> "Machine":
+def _machine(kind: str, variant: str, values: _Values) -> "Machine":
     """The machine of the options; values that they leave open are asked for, or defaults."""
     from busplan.profile.starter import Machine, shared_out
 
@@ -237,9 +245,13 @@ def _machine(kind: str, values: _Values) -> "Machine":
     if groups and values.given.keys() & {"--nodes", "--axes"}:
         raise BusplanError("--group: cannot be used with --nodes or --axes: each group says its own")
     if not groups:
-        nodes = values.number("--nodes", "Nodes, the host not counted", _NODES)
-        axes = values.number("--axes", "Axes of all nodes", _AXES_PER_NODE * nodes)
+        per_node = 1 if variant in starter.servos else _AXES_PER_NODE
+        usual = ceil(values.given["--axes"] / per_node) if "--axes" in values.given else _NODES
+        nodes = values.number("--nodes", "Nodes, the host not counted", usual)
+        axes = values.number("--axes", "Axes of all nodes", per_node * nodes)
         groups = shared_out(axes, nodes=nodes)
+    if variant in starter.servos and "--bytes-per-axis" not in values.given:
+        groups = tuple(_with_servo_data(group, starter.servos[variant]) for group in groups)
     period_us = values.period_us(starter.period)
     size = _BYTES_PER_AXIS
     if any(group.read_bytes is None for group in groups):
@@ -256,7 +268,17 @@ def _machine(kind: str, values: _Values) -> "Machine":
         kinds = listed([name for name in kind_names() if kind_named(name).starter.hosts], "or")
         known = f"there are {', '.join(starter.hosts)}"
         raise BusplanError(f"--host {host}: {known if starter.hosts else f'only for --bus {kinds}, not for {kind}'}")
-    return Machine(groups, period_us, size, host, rate=_rate(kind, values))
+    return Machine(groups, period_us, size, host, variant, _rate(kind, values))
+
+
+def _with_servo_data(group: "NodeGroup", data: Mapping[str, tuple[int, str]]) -> "NodeGroup":
+    """The group with the usual data of its servos, where it does not say its own."""
+    if group.axes != 1 or group.read_bytes is not None:
+        return group
+    (read_bytes, read), (write_bytes, write) = data["read"], data["write"]
+    return group._replace(
+        read_bytes=read_bytes, write_bytes=write_bytes, data=(f"assumed: {read}", f"assumed: {write}")
+    )
 
 
 def _rate(kind: str, values: _Values) -> int | None:

@@ -40,7 +40,6 @@ from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network, Rate
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, step, total
-from busplan.sections.base import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
     from busplan.buses.ethercat.section import EthercatBus
@@ -322,9 +321,13 @@ class EthercatCycle(BusCycle):
             # The master's pipeline begins with the cycle that brings the feedback.
             drive_us = feedback["drive_us"] + command["drive_us"]
             loop = {**command, "drive_us": drive_us, "frame_wait_us": feedback["frame_wait_us"]}
-            ways = {"command": ["write"], "feedback": ["read"], "loop": TRANSACTION_KINDS}
-            for name, phases in (("command", command), ("feedback", feedback), ("loop", loop)):
-                if not all(map(group.has, ways[name])):
+            is_read, is_written = group.has("read"), group.has("write")
+            for name, phases, is_there in (
+                ("command", command, is_written),
+                ("feedback", feedback, is_read),
+                ("loop", loop, is_read and is_written),
+            ):
+                if not is_there:
                     continue
                 whole_us = {LATENCY_TABLE[-1].key: total(phases.values())}
                 latencies.append(BusLatency(name, None, phases | whole_us, group.name))

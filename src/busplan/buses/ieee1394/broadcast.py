@@ -218,13 +218,14 @@ class BroadcastCycle(CycleWithStarts):
             write("request_data", "data", self.write.request_data_us, "commands to all nodes"),
             write("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
         )
-        for kind, events in (
+        parts: tuple[tuple[TransactionKind, tuple[BusEvent, ...]], ...] = (
             ("read", (*_waits(self.hub_wait, "before the hub is read"), *read_hub)),
             ("read", _waits(IdleTime(hub.idle_us, hub.host_us), "after the hub's block")),
             ("write", (*write_hub, *_waits(IdleTime(self.write.idle_us, self.write.host_us), "after the write"))),
-        ):
+        )
+        for kind, part in parts:
             if any(group.has(kind) for group in self.network.groups):
-                yield Run(tuple(event._replace(us=self._if_any(kind, event.us)) for event in events))
+                yield Run(tuple(event._replace(us=self._if_any(kind, event.us)) for event in part))
 
     @cached_property
     def read(self) -> Phases:

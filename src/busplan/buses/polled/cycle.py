@@ -228,15 +228,13 @@ class PolledCycle(BusCycle):
             sizes = choose(is_there, sizes[0], one_way[0]), choose(is_there, sizes[1], one_way[1])
         return sizes
 
-    def _execution_us(self, kind: str, group: Group) -> Number:
+    def _execution_us(self, kind: Literal["exchange", "read", "write"], group: Group) -> Number:
         """Own time of a node before it answers [us]; 0 where it answers from a buffer."""
         if self._protocol.is_buffered:
             return 0.0
-        if kind == "read" or kind == "write":
-            return group.slowest_us(kind)
-        return reduce(larger, map(group.slowest_us, TRANSACTION_KINDS))
+        return reduce(larger, map(group.slowest_us, TRANSACTION_KINDS if kind == "exchange" else (kind,)))
 
-    def _answer(self, kind: str, size: Number, group: Group) -> tuple[BusEvent, ...]:
+    def _answer(self, kind: Literal["exchange", "read", "write"], size: Number, group: Group) -> tuple[BusEvent, ...]:
         turn_us = self._turn_us + self._execution_us(kind, group)
         return (
             BusEvent("turn", "cycle_turn_us", turn_us, "turn-around", transaction=kind),

@@ -82,6 +82,8 @@ class Polled(Bus):
     starter = Starter(
         _SECTIONS["profibus"],
         variants=_SECTIONS,
+        servos={table.lower(): words["nodes"] for table, words in c.beside.items() if "nodes" in words},
+        bases_us={table.lower(): words["base_us"] for table, words in c.beside.items() if "base_us" in words},
         period="10ms",
         measure="from the end of a request to the answer, less bus.return_delay_us",
         base="time of a node before it answers",
