@@ -129,6 +129,7 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
         "dynamixel-2": ["sync", "fast-sync", "single"],
         "feetech": ["sync", "single"],
         "worldfip": ["single"],
+        "mesa-hm2-eth": ["single"],
     }
 
     def of_protocol(protocol: str) -> st.SearchStrategy[dict[str, Any]]:

@@ -257,7 +257,7 @@ class BusCycle(ABC):
 
     def taking_us(self, group: Group) -> float:
         """Time from a command's arrival at a node to its effect: the slowest execution of a write [us]."""
-        return group.write_execution_us + group.worst_extra_us
+        return float(group.slowest_us("write"))
 
     def sampled_us(self) -> float:
         """Time from the start of a cycle at which nodes sample the feedback that it carries, in plain numbers [us]."""

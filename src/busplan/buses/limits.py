@@ -12,9 +12,9 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject
-from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller, total
 from busplan.english import told_apart
-from busplan.sections.base import beside
+from busplan.sections.base import TRANSACTION_KINDS, beside
 from busplan.sourced import Grade
 
 Value = int | float | str
@@ -342,10 +342,14 @@ class Starter(NamedTuple):
     """Other buses of the kind by name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
     without_wake_up: tuple[str, ...] = ()
     """Variants that have no key of the host's wake-up."""
+    servos: Mapping[str, Mapping[str, tuple[int, str]]] = {}
+    """Variants whose nodes are servos of one axis: their data by direction [bytes], each with its meaning."""
     rate: str = ""
     """Key of [bus] with a bit rate that a user is asked for; empty where there is only one."""
     base: str = "time of a node's work in each cycle"
     """Meaning of execution.base_us."""
+    bases_us: Mapping[str, int] = {}
+    """Value of execution.base_us in variants whose nodes are known to take longer than others [us]."""
     table: str = ""
     """Keys of a published execution time, in place of a guess."""
     tables: Mapping[str, str] = {}
@@ -361,7 +365,7 @@ class Starter(NamedTuple):
             or f"""\
 kind = "linear"
 grade = "assumed"          # between 0 and twice its value
-base_us = 20               # assumed: {self.base}
+base_us = {self.bases_us.get(variant, 20)}               # assumed: {self.base}
 per_byte_us = 0.1          # assumed: time per byte
 """
         )
@@ -567,7 +571,7 @@ def busy_words(group: Group, network: Network) -> str:
 
 def _busy_us(group: Group) -> Number:
     """Execution time of a node in a cycle: a read and a write, the slowest of each [us]."""
-    return group.read_execution_us + group.write_execution_us + 2 * group.worst_extra_us
+    return total(map(group.slowest_us, TRANSACTION_KINDS))
 
 
 def _busy_doubt_us(group: Group) -> Number:

@@ -3,6 +3,8 @@
 import re
 import shlex
 import sys
+from collections.abc import Mapping
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
@@ -49,10 +51,16 @@ def init_command(
         ),
     ] = None,
     nodes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]")
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4, or as --axes needs]"
+        ),
     ] = None,
     axes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node]")
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node, 1 for each servo]"
+        ),
     ] = None,
     group: Annotated[
         list[str] | None,
@@ -240,9 +248,13 @@ def _machine(kind: str, variant: str, values: _Values) -> "Machine":
     if groups and values.given.keys() & {"--nodes", "--axes"}:
         raise BusplanError("--group: cannot be used with --nodes or --axes: each group says its own")
     if not groups:
-        nodes = values.number("--nodes", "Nodes, the host not counted", _NODES)
-        axes = values.number("--axes", "Axes of all nodes", _AXES_PER_NODE * nodes)
+        per_node = 1 if variant in starter.servos else _AXES_PER_NODE
+        usual = ceil(values.given["--axes"] / per_node) if "--axes" in values.given else _NODES
+        nodes = values.number("--nodes", "Nodes, the host not counted", usual)
+        axes = values.number("--axes", "Axes of all nodes", per_node * nodes)
         groups = shared_out(axes, nodes=nodes)
+    if variant in starter.servos and "--bytes-per-axis" not in values.given:
+        groups = tuple(_with_servo_data(group, starter.servos[variant]) for group in groups)
     period_us = values.period_us(starter.period)
     size = _BYTES_PER_AXIS
     if any(group.read_bytes is None for group in groups):
@@ -268,6 +280,16 @@ def _host(kind: str, variant: str, values: _Values) -> str | None:
         why = f"{kind} has {', '.join(known)}" if known else f"only for --bus {kinds}, not for {variant or kind}"
         raise BusplanError(f"--host {host}: {why}")
     return host
+
+
+def _with_servo_data(group: "NodeGroup", data: Mapping[str, tuple[int, str]]) -> "NodeGroup":
+    """The group with the usual data of its servos, where it does not say its own."""
+    if group.axes != 1 or group.read_bytes is not None:
+        return group
+    (read_bytes, read), (write_bytes, write) = data["read"], data["write"]
+    return group._replace(
+        read_bytes=read_bytes, write_bytes=write_bytes, data=(f"assumed: {read}", f"assumed: {write}")
+    )
 
 
 def _rate(kind: str, values: _Values) -> int | None:

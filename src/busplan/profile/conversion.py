@@ -99,11 +99,11 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
     # What a new profile assumes of its host gives way to the machine's own.
     given_way = {key for role in _OF_HOST for key in _keys(bus, role).values() if bus.key_of(role) in values}
     new["bus"] = {name: value for name, value in new["bus"].items() if f"bus.{name}" not in given_way}
-    raised, empty = _with_payloads(machine)
+    empty = _without_couplers(machine)
     # A key that both have takes the value of the new bus.
     merged = {**machine, **{name: {**machine.get(name, {}), **table} for name, table in new.items()}}
     new_profile = profile_of(merged)
-    given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
+    given = [AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}"]
     assumed = (*given, *(one for one in _defaults(new_profile) if one.key not in values))
     return Conversion(new_profile, assumed, (*left_out, *empty), of_host)
 
@@ -166,22 +166,13 @@ def _say_payloads(machine: TomlTable, profile: Profile) -> None:
                 section[nodes.payload.key_of(kind)] = nodes.payload.bytes_of(kind, axes=1)
 
 
-def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
-    """Give nodes data in both directions.
-
-    Returns the keys set for that, and the groups left out because they have no data, as couplers.
-    """
+def _without_couplers(machine: TomlTable) -> tuple[str, ...]:
+    """Leave groups without data out, as couplers; returns their keys."""
     groups: Sequence[TomlTable] = machine.get("group", ())
     empty = [group["name"] for group in groups if not any(group.get(key, 1) for key in _SIZES)]
-    raised = []
-    for group in groups:
-        for key in _SIZES:
-            if group.get(key) == 0 and group["name"] not in empty:
-                group[key] = 1
-                raised.append(AssumedKey(f"group.{group['name']}.{key}", 1, "setting"))
     if empty and len(empty) < len(groups):
         machine["group"] = [group for group in groups if group["name"] not in empty]
-    return raised, [f"group.{name}" for name in empty]
+    return tuple(f"group.{name}" for name in empty)
 
 
 def _cables_m(profile: Profile) -> dict[str, float]:

@@ -141,7 +141,7 @@ class Profile(Section):
                 continue
             right = f'measure it and add it to {nodes.node_key("execution")}, or use kind = "linear"'
             for key, size, sum_ in _payloads(nodes, place):
-                if not execution.covers(size):
+                if size and not execution.covers(size):
                     why = f"{sum_}is outside the execution table, {execution.range_bytes}: {right}"
                     yield Problem(why, key=key, kind="execution-unknown")
 

@@ -352,7 +352,10 @@ def test_a_wrong_protocol_says_where(tmp_path: Path, old: str, new: str, words: 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"bus.protocol": "profinet"}, 'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech" or "worldfip"'),
+        (
+            {"bus.protocol": "profinet"},
+            'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech", "worldfip" or "mesa-hm2-eth"',
+        ),
         ({"bus.requests": "exchange"}, "it has sync, fast-sync, single"),
         ({"bus.retries": 1}, "give bus.timeout_us"),
         ({"bus.global_control": True}, "no broadcast that opens a cycle"),
@@ -410,6 +413,7 @@ def test_a_command_of_an_exchange_rests_on_the_cycle_before() -> None:
         ("Dynamixel 2", "dynamixel-2"),
         ("feetech", "feetech"),
         ("worldfip", "worldfip"),
+        ("mesa", "mesa-hm2-eth"),
         ("polled", "profibus-dp"),
     ],
 )
@@ -418,6 +422,14 @@ def test_a_new_profile_is_of_the_bus_that_is_asked_for(word: str, protocol: str,
     done = CliRunner().invoke(app, ["init", str(path), "--bus", word, "--nodes", "6", "--axes", "6"])
     assert done.exit_code == 0, done.output
     assert value_at(busplan.load_profile(path), "bus.protocol") == protocol
+
+
+def test_a_thread_of_linuxcnc_by_hand() -> None:
+    """Frames with preamble, header and FCS at 0.08 us a byte, a gap of 12 bytes behind each, and the answer's turn."""
+    request, answer, write = (8 + max(length, 60) + 4 for length in (48, 62, 84))
+    answered_us = (request + 12 + answer) * 0.08 + 47.4
+    assert answered_us == pytest.approx(60, abs=0.1)
+    assert required_us(busplan.load_profile("mesa-hm2-eth")) == pytest.approx(answered_us + (12 + write + 12) * 0.08)
 
 
 def test_a_sweep_is_its_points() -> None:

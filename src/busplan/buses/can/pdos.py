@@ -22,6 +22,7 @@ from busplan.elementwise import (
     FIT_ROUNDING,
     Number,
     choose,
+    is_everywhere,
     is_off,
     larger,
     named,
@@ -31,7 +32,7 @@ from busplan.elementwise import (
     total,
     within,
 )
-from busplan.sections.base import TransactionKind
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 from busplan.sections.cycle import time_uncertainty_us
 
 
@@ -354,12 +355,15 @@ class PdoCycle(CanCycle):
     @property
     def ends(self) -> tuple[tuple[str, str], ...]:
         """Name and group of the last PDO of each group in each direction."""
-        return tuple((pdos.name, pdos.group) for pdos in self.traffic.pdos)
+        return tuple(
+            (pdos.name, pdos.group) for pdos in self.traffic.pdos if not is_everywhere(pdos.payload_bytes <= 0)
+        )
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case responses, and the way from SYNC to the last executed command."""
         answers = super().latencies()
-        if any(answer.name == LOOP for answer in answers):
+        is_closed = all(any(group.has(kind) for group in self.network.groups) for kind in TRANSACTION_KINDS)
+        if not is_closed or any(answer.name == LOOP for answer in answers):
             return answers
         return *answers, BusLatency(LOOP, None, self._loop())
 

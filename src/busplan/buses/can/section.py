@@ -45,7 +45,7 @@ BitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_BIT_RATE, allow_inf_
 DataBitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_DATA_BIT_RATE, allow_inf_nan=False)]
 PdoBytes = Annotated[
     tuple[Annotated[int, Field(ge=1, le=int(c.unchanged["FD_FRAME_BYTES"]))], ...],
-    Field(strict=False, min_length=1, max_length=int(c.unchanged["MOST_PDOS"])),
+    Field(strict=False, max_length=int(c.unchanged["MOST_PDOS"])),
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 Queue = Literal["priority", "fifo", "single-buffer"]
@@ -232,7 +232,8 @@ class CanPayload(PayloadSection):
     )
     feedback_pdos: PdoBytes | None = Field(
         default=None,
-        description="Data of each feedback PDO, up to 8 (CAN FD 64); their sum is the default of read_bytes [bytes]",
+        description="Data of each feedback PDO, up to 8 (CAN FD 64), [] for none; their sum is the default of "
+        "read_bytes [bytes]",
         examples=[[6, 6]],
     )
     command_pdos: PdoBytes | None = Field(
@@ -240,6 +241,13 @@ class CanPayload(PayloadSection):
         description="Data of each command PDO; their sum is the default of write_bytes [bytes]",
         examples=[[6, 6]],
     )
+
+    def _problems(self) -> Iterator[Problem]:
+        for kind in TRANSACTION_KINDS:
+            key = f"{NAMES[kind]}_pdos"
+            if getattr(self, key) == () and any(self._parts(kind)):
+                why = f"is empty, so nothing is sent, and {self.key_of(kind)} has data; give one of the two"
+                yield Problem(why, key=key, kind="inconsistent")
 
     def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
         fixed, per_axis = super()._parts(kind)

@@ -105,10 +105,6 @@ class SyncCycle(PdoCycle):
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:
     """The slowest execution of a group's nodes, with some standard uncertainties [us]."""
-    execution_us, doubt_us = (
-        (group.read_execution_us, group.read_uncertainty_us)
-        if kind == "read"
-        else (group.write_execution_us, group.write_uncertainty_us)
-    )
-    slowest_us = execution_us + group.worst_extra_us
+    doubt_us = group.read_uncertainty_us if kind == "read" else group.write_uncertainty_us
+    slowest_us = group.slowest_us(kind)
     return slowest_us + uncertainties * doubt_us if uncertainties else slowest_us

@@ -332,7 +332,7 @@ def _traffic_of(network: Network) -> Traffic:
         sync_bytes=1 if bus.sync_counter else 0,
         # A punctual SYNC is no input of a derivation.
         sync_jitter_us=_unless(bus.sync_jitter_us, 0),
-        read_us=reduce(larger, (group.read_execution_us + group.worst_extra_us for group in groups)),
+        read_us=reduce(larger, (group.slowest_us("read") for group in groups)),
         # Where the host computes in a cycle of its own, it takes no time of this one.
         host_us=choose(bus.pipeline_cycles > 0, 0.0, bus.host_us),
     )
@@ -389,9 +389,10 @@ def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> P
     if identifier is None:
         identifier = int(c[_FIRST[kind]]) if is_first else FOLLOWS
     number = of_node(group)
-    payload_bytes = share_bytes(group.read_bytes if kind == "read" else group.write_bytes, pdos=number)
+    payload_bytes = share_bytes(group.bytes_of(kind), pdos=number)
     frame_bytes = (c.FRAME_BYTES if bus.data_bit_rate_kbit_s is None else c.FD_FRAME_BYTES,)
-    lengths = getattr(payload, f"{NAMES[kind]}_pdos")
+    # No PDOs have no lengths.
+    lengths = getattr(payload, f"{NAMES[kind]}_pdos") or None
     return Pdos(
         kind,
         group.name,

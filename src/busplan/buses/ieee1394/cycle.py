@@ -15,7 +15,7 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.doubts import ACKNOWLEDGED, UNACKNOWLEDGED
 from busplan.buses.ieee1394.figures import JITTER, LATENCY, READS, SYNC, TERMS, WRITES, Ieee1394Figures
-from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
+from busplan.buses.ieee1394.timing import NO_PHASES, Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     GroupHops,
@@ -334,7 +334,13 @@ class Ieee1394Cycle(CycleWithStarts):
     def _exchanges(self, hops: Sequence[Number]) -> tuple[Exchange, ...]:
         """Transactions of all groups, each with a node at the given hops; a derivation tells their phases apart."""
         places = range(len(self.network.groups))
-        exchanges = tuple(self._exchange(place, kind, hops[place]) for kind in TRANSACTION_KINDS for place in places)
+        groups = self.network.groups
+        exchanges = tuple(
+            self._exchange(place, kind, hops[place])
+            for kind in TRANSACTION_KINDS
+            for place in places
+            if groups[place].has(kind)
+        )
         for sent in exchanges:
             _name_phases(sent.phases, f",{sent.kind}{sent.group.name and f',{sent.group.name}'}")
         return exchanges
@@ -377,11 +383,12 @@ class Ieee1394Cycle(CycleWithStarts):
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The synchronous packet, then each transaction of every node."""
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
+        places = {id(group): place for place, group in enumerate(self.network.groups)}
         for kind in TRANSACTION_KINDS:
-            for place, transaction in enumerate(sent for sent in self.exchanges if sent.kind == kind):
-                yield Run(
-                    transaction.parts, transaction.group.nodes, place, partial(self._laid_out, transaction, place)
-                )
+            for transaction in self.exchanges:
+                if transaction.kind == kind:
+                    place = places[id(transaction.group)]
+                    yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
 
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
         """Events of the transaction with one node of a group; `number` counts the group's nodes from 0."""
@@ -392,7 +399,7 @@ class Ieee1394Cycle(CycleWithStarts):
     def all_us(self, kind: TransactionKind) -> Number:
         """Time of the reads or writes of all nodes, gaps included [us]."""
         sent = (exchange for exchange in self.exchanges if exchange.kind == kind)
-        return total(exchange.group.nodes * exchange.phases.transaction_us for exchange in sent)
+        return total(exchange.nodes * exchange.phases.transaction_us for exchange in sent)
 
     def bias_us(self) -> Number | None:
         """Mean time that the transactions take beyond the model [us]; None under the paper model."""
@@ -411,13 +418,16 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def longest(self, kind: TransactionKind) -> Phases:
         """The maximum of each phase over the reads or writes with the farthest node of each group [us]."""
-        columns = zip(*(sent.phases for sent in self._farthest if sent.kind == kind), strict=True)
+        sent = [(sent.group, sent.phases) for sent in self._farthest if sent.kind == kind]
+        if not sent:
+            return NO_PHASES
+        columns = zip(*([group.if_any(kind, us) for us in phases] for group, phases in sent), strict=True)
         return Phases(*(reduce(larger, column) for column in columns))
 
     def published_nodes(self) -> Number | None:
         """Number of nodes by equation (11) [1]; None where nodes differ."""
         network = self.network
-        if not network.is_uniform:
+        if not network.is_uniform or not all(map(network.groups[0].has, TRANSACTION_KINDS)):
             return None
         read, write = self.longest("read"), self.longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
@@ -431,7 +441,9 @@ class Ieee1394Cycle(CycleWithStarts):
     def latencies(self) -> tuple[BusLatency, ...]:
         """Latencies of a read and of a write, with the farthest node of each group."""
         latencies, all_us = [], {"read": self.reads_us, "write": self.writes_us}
-        for place, kind in product(range(len(self.network.groups)), TRANSACTION_KINDS):
+        for (place, group), kind in product(enumerate(self.network.groups), TRANSACTION_KINDS):
+            if not group.has(kind):
+                continue
             sent = self._exchange(place, kind, self._hops[place].last)
             link = sent.delays.link
             phases = {"hops": link.hops, "gap_count": link.gap_count, **sent.phases._asdict(), "all_us": all_us[kind]}

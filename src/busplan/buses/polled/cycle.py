@@ -20,7 +20,7 @@ from busplan.buses.polled.protocols import (
     protocol_of,
     times,
 )
-from busplan.elementwise import Number, is_everywhere, is_off, larger, named, total
+from busplan.elementwise import Number, choose, is_everywhere, is_off, larger, named, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 if TYPE_CHECKING:
@@ -170,6 +170,16 @@ class _Exchange(NamedTuple):
         return not is_everywhere(self.answer_bytes <= 0)
 
 
+def _has(kind: _Kind, group: Group) -> bool:
+    """Whether nodes of a group have exchanges of a kind; in an array, at any point."""
+    return kind == "exchange" or group.has(kind)
+
+
+def _if_any(kind: _Kind, group: Group, number: Number) -> Number:
+    """A number of exchanges of a kind; 0 where the nodes of a group have none."""
+    return number if kind == "exchange" else group.if_any(kind, number)
+
+
 class PolledCycle(BusCycle):
     """All feedback, then all commands; or an exchange with each node in turn.
 
@@ -238,7 +248,7 @@ class PolledCycle(BusCycle):
         if self.way == "exchange":
             yield host
         for kind in self._kinds:
-            for place in range(len(self.network.groups)):
+            for place in (place for place, group in enumerate(self.network.groups) if _has(kind, group)):
                 yield from self._together(kind, place) if self.way in TOGETHER else (self._single(kind, place),)
             if kind == "read":
                 yield host
@@ -267,8 +277,9 @@ class PolledCycle(BusCycle):
 
     def _longest_us(self, group: Group) -> Number:
         kinds = TRANSACTION_KINDS[:1] if self.way in TOGETHER else self._kinds
-        longest = (self._exchange(kind, group, ProtocolFigures.most_data_bytes) for kind in kinds)
-        return self._wire_us(reduce(larger, (exchange.request_bytes for exchange in longest)))
+        longest = ((kind, self._exchange(kind, group, ProtocolFigures.most_data_bytes)) for kind in kinds)
+        sizes = (_if_any(kind, group, exchange.request_bytes) for kind, exchange in longest)
+        return self._wire_us(reduce(larger, sizes))
 
     def _times_a_cycle(self, kind: _Kind) -> Number:
         return {"read": self.bus.reads, "write": self.bus.writes}.get(kind, 1)
@@ -282,8 +293,7 @@ class PolledCycle(BusCycle):
         requests = self._times_a_cycle(kind)
         read_bytes, written_bytes = (share(protocol, size, requests) for size in (group.read_bytes, group.write_bytes))
         if kind == "exchange":
-            request = protocol.exchange_request_bytes + written_bytes
-            return _Exchange(request, protocol.exchange_answer_bytes + read_bytes, 1)
+            return _Exchange(*self._both_ways(group, read_bytes, written_bytes), 1)
         if kind == "write" and self.way in TOGETHER:
             return _Exchange(protocol.sync_write_bytes + nodes * (protocol.sync_node_bytes + written_bytes))
         if kind == "write":
@@ -296,13 +306,30 @@ class PolledCycle(BusCycle):
             return _Exchange(request, answer, nodes)
         return _Exchange(request, protocol.fast_answer_bytes + nodes * (protocol.fast_node_bytes + read_bytes), 1)
 
-    def _execution_us(self, kind: str, group: Group) -> Number:
+    def _both_ways(self, group: Group, read_bytes: Number, written_bytes: Number) -> tuple[Number, Number]:
+        """Request and answer of an exchange with a node; with data one way alone, a read or a write [bytes].
+
+        A protocol without these sends an exchange that is empty in the other direction.
+        """
+        protocol = self._protocol
+        request, answer = protocol.exchange_request_bytes + written_bytes, protocol.exchange_answer_bytes + read_bytes
+        alone: dict[TransactionKind, tuple[Number, Number]] = {
+            "write": (protocol.read_request_bytes, protocol.read_answer_bytes),
+            "read": (protocol.write_request_bytes, protocol.write_answer_bytes),
+        }
+        for missing, (asked, answered) in alone.items():
+            is_there: Number = group.bytes_of(missing) > 0
+            if is_everywhere(is_there) or is_everywhere(asked <= 0) or is_everywhere(answered <= 0):
+                continue
+            request = choose(is_there, request, asked + written_bytes)
+            answer = choose(is_there, answer, answered + read_bytes)
+        return request, answer
+
+    def _execution_us(self, kind: _Kind, group: Group) -> Number:
         """Own time of a node before it answers [us]; 0 where it answers from a buffer."""
         if self._protocol.is_buffered:
             return 0.0
-        read_us, write_us = group.read_execution_us, group.write_execution_us
-        own_us = {"read": read_us, "write": write_us}.get(kind)
-        return (larger(read_us, write_us) if own_us is None else own_us) + group.worst_extra_us
+        return reduce(larger, map(group.slowest_us, TRANSACTION_KINDS if kind == "exchange" else (kind,)))
 
     @cached_property
     def _waits(self) -> dict[tuple[_Kind, int], Number]:
@@ -313,7 +340,7 @@ class PolledCycle(BusCycle):
                 self._exchange(kind, group, share)
                 for share in (ProtocolFigures.least_data_bytes, ProtocolFigures.most_data_bytes)
             )
-            if most.is_answered:
+            if most.is_answered and _has(kind, group):
                 answer_us = self._turn_us + self._execution_us(kind, group) + self._wire_us(most.answer_bytes)
                 wire_us = self._wire_us(most.request_bytes) + most.answers * answer_us
                 exchange_us = self._times.before + wire_us + self._times.after
@@ -336,14 +363,19 @@ class PolledCycle(BusCycle):
         if not self.is_least or adapter.is_off:
             yield event(0.0 if adapter.is_off else adapter.timer_us + adapter.frame_us)
             return
-        wait_us, before = self._waits[kind, place], list(self._waits)[: list(self._waits).index((kind, place))]
-        if not before:
-            yield event(wait_us, BUT_FIRST)
-        elif kind == "write" and before[-1][0] == "read" and not is_off(self.bus.host_us):
-            yield event(larger(wait_us - self.bus.host_us, 0.0), FIRST)
-            yield event(wait_us, BUT_FIRST)
-        else:
-            yield event(wait_us)
+        group, wait_us = self.network.groups[place], self._waits[kind, place]
+        before = list(self._waits)[: list(self._waits).index((kind, place))]
+        ahead, reads = (
+            total(_if_any(kind, self.network.groups[at], 1) for kind, at in before if kind in kinds)
+            for kinds in ((kind,), ("read",))
+        )
+        if before and is_everywhere(ahead > 0):
+            yield event(_if_any(kind, group, wait_us))
+            return
+        behind_host_us = larger(wait_us - self.bus.host_us, 0.0) if kind == "write" else 0.0
+        first_us = choose(ahead > 0, wait_us, choose(reads > 0, behind_host_us, 0.0))
+        yield event(_if_any(kind, group, first_us), FIRST)
+        yield event(_if_any(kind, group, wait_us), BUT_FIRST)
 
     @property
     def _adapter_key(self) -> str:
@@ -363,7 +395,7 @@ class PolledCycle(BusCycle):
         """The same cycle with the least time of the adapter."""
         return self if self.is_least else PolledCycle(self.network, self.model, is_least=True)
 
-    def _answer(self, kind: str, size: Number, group: Group) -> tuple[BusEvent, ...]:
+    def _answer(self, kind: _Kind, size: Number, group: Group) -> tuple[BusEvent, ...]:
         turn_us = self._turn_us + self._execution_us(kind, group)
         return (
             BusEvent("turn", "cycle_turn_us", turn_us, "turn-around", transaction=kind),
@@ -387,12 +419,13 @@ class PolledCycle(BusCycle):
         group = self.network.groups[place]
         exchange, (before, after) = self._exchange(kind, group), self._around(kind, place, f"{kind} request")
         answers = self._answer(kind, exchange.answer_bytes, group) if exchange.is_answered else ()
-        rounds = group.nodes if kind == "exchange" else group.nodes * self._times_a_cycle(kind)
+        rounds = _if_any(kind, group, group.nodes * self._times_a_cycle(kind))
         return Run((*before, *answers, *after), rounds, place)
 
     def _together(self, kind: _Kind, place: int) -> Iterator[Run]:
         """One request for all nodes of a group: all answer a read, in turn or in one telegram, and none a write."""
-        group, rounds = self.network.groups[place], self._times_a_cycle(kind)
+        group = self.network.groups[place]
+        rounds = _if_any(kind, group, self._times_a_cycle(kind))
         exchange, (before, after) = self._exchange(kind, group), self._around(kind, place, f"{self.way} {kind}")
         answers = self._answer(kind, exchange.answer_bytes, group) if exchange.is_answered else ()
         if not answers or self.way == "fast-sync":
@@ -409,7 +442,7 @@ class PolledCycle(BusCycle):
         exchange, rounds = self._exchange(kind, group), self._times_a_cycle(kind)
         if not exchange.is_answered:
             return 0
-        return rounds * (group.nodes if self.way == "single" else exchange.answers)
+        return _if_any(kind, group, rounds * (group.nodes if self.way == "single" else exchange.answers))
 
     def part_us(self, *, kind: str) -> float:
         """Time of the exchanges of a kind, "read", "write" or "exchange", in plain numbers [us]."""

@@ -105,6 +105,8 @@ class Polled(Bus):
         _SECTIONS["profibus"],
         variants=_SECTIONS,
         tables={table.lower(): words["execution"] for table, words in c.beside.items() if "execution" in words},
+        servos={table.lower(): words["nodes"] for table, words in c.beside.items() if "nodes" in words},
+        bases_us={table.lower(): words["base_us"] for table, words in c.beside.items() if "base_us" in words},
         period="10ms",
         measure="from the end of a request to the answer, less bus.return_delay_us",
         base="time of a node before it answers",
@@ -132,7 +134,7 @@ class Polled(Bus):
         {"bus.adapter": NO_ADAPTER},
         {"bus.master_jitter_us": 0.0},
     )
-    evidence_data = ("polled",)
+    evidence_data = ("polled", "mesa")
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """The time of the reads, or the writes, of a cycle."""

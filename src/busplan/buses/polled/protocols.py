@@ -22,7 +22,7 @@ from busplan.sourced import Constants, cached
 c: Final = Constants(
     "busplan.buses.polled",
     beside=(
-        *("name", "called", "rates", "start", "execution", "evidence"),
+        *("name", "called", "rates", "start", "execution", "evidence", "nodes", "base_us"),
         *("is_buffered", "is_stuffed", "has_token", "has_arbiter"),
     ),
 )

@@ -208,7 +208,7 @@ class Sercos3Cycle(SercosCycle):
         at_start_us = self.network.profile.bus.at_start_us
         return self._start_us() + (start_us if at_start_us is None else larger(start_us, at_start_us))
 
-    def latencies(self) -> tuple[BusLatency, ...]:
+    def both_delays(self) -> tuple[BusLatency, BusLatency]:
         """Age of feedback when the host has it, and delay of a command up to its effect."""
         return delays(
             self.network,
