@@ -206,7 +206,7 @@ def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[Fie
     field = model.model_fields.get(str(path[0]))
     inner = [] if field is None else models_of(field.annotation)
     rest = path[2:] if len(path) > 1 and isinstance(path[1], int) else path[1:]
-    if field is not None and not (rest and inner):
+    if field is not None and not rest:
         yield field
     for section in inner if rest else []:
         yield from _fields(section, rest)
