@@ -231,7 +231,7 @@ def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefi
         sections = [f"{name}.{table}" for table in names.get(name, ())] if _are_several(field.annotation) else [name]
         for section, section_model in product(sections, inner):
             yield from value_keys(section_model, {}, f"{prefix}{section}.")
-        if not inner and (_is_number(field.annotation) or _words(field.annotation)):
+        if _words(field.annotation) or (not inner and _is_number(field.annotation)):
             yield f"{prefix}{name}"
 
 
