@@ -182,7 +182,7 @@ def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
     )
     assert code == 0
     assert said.index("myrinet: no kind of bus") < said.index("Nodes, the host")
-    assert said.count("Nodes, the host not counted [4]") == 3
+    assert said.count("Nodes, the host not counted [3]") == 3
     assert "must be 1 or more" in said
     assert "Axes of all nodes" not in said
     data = tomllib.loads((tmp_path / "asked.toml").read_text(encoding="utf-8"))

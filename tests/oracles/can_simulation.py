@@ -226,12 +226,18 @@ class _Bus:
             self.feedback[cycle][number] = ready_us - cycle * self.period_us
             for frame in node.feedback:
                 self.put(ready_us, frame, FEEDBACK, cycle, number)
+        if not self.missing[cycle]:
+            self.compute(now_us, cycle)
 
     def feedback_arrived(self, now_us: int, cycle: int, _number: int) -> None:
         """Behind the last feedback the host begins to compute."""
         self.missing[cycle] -= 1
-        if self.missing[cycle]:
-            return
+        self.ends[cycle] = max(self.ends[cycle], now_us - cycle * self.period_us)
+        if not self.missing[cycle]:
+            self.compute(now_us, cycle)
+
+    def compute(self, now_us: int, cycle: int) -> None:
+        """The host computes the commands."""
         ready_us = now_us + self.host_us[cycle]
         self.commands[cycle] = ready_us - cycle * self.period_us
         for number, node in enumerate(self.nodes):

@@ -255,6 +255,8 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
     if random.random() < 0.4:  # some that block, seldom
         messages += (Message(f"low{number}", 0x7F0 + number, 8, 50_000) for number in range(3))
     sizes = random.choice([1, 4, 8, 8, 10, 16]), random.choice([1, 4, 8, 8, 10, 16])
+    if random.random() < 0.2:  # nodes that are only read, or only written
+        sizes = random.choice([(sizes[0], 0), (0, sizes[1])])
     return Traffic(
         (Group(sizes, (0x181, random.choice([0x201, 0x201, 0x120])), nodes),),
         tuple(messages),
