@@ -385,7 +385,8 @@ def judged(sent: Traffic, *, slack_us: int = 0) -> Scene | None:
     if len(set(identifiers)) < len(identifiers):
         return None
     on_arrival = busplan.load_profile(sent.profile(1e6), changes={"servo.update": "on_arrival"})
-    lasts_us = responses(on_arrival)["loop"]
+    # Nodes that are only read, or only written, have no loop.
+    lasts_us = responses(on_arrival).get("loop", busplan.capacity(on_arrival).results[0].required_us)
     if lasts_us is None:
         return None
     period_us = int(lasts_us) + slack_us
