@@ -260,6 +260,8 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
     if random.random() < 0.4:  # some that block, seldom
         messages += (Message(f"low{number}", 0x7F0 + number, 8, 50_000) for number in range(3))
     sizes = random.choice([1, 4, 8, 8, 10, 16]), random.choice([1, 4, 8, 8, 10, 16])
+    if random.random() < 0.2:  # nodes that are only read, or only written
+        sizes = random.choice([(sizes[0], 0), (0, sizes[1])])
     return Traffic(
         (Group(sizes, (0x181, random.choice([0x201, 0x201, 0x120])), nodes),),
         tuple(messages),
@@ -396,7 +398,8 @@ def judged(sent: Traffic, *, slack_us: int = 0) -> Scene | None:
     if len(set(identifiers)) < len(identifiers):
         return None
     on_arrival = busplan.load_profile(sent.profile(1e6), changes={"servo.update": "on_arrival"})
-    lasts_us = responses(on_arrival)["loop"]
+    # Nodes that are only read, or only written, have no loop.
+    lasts_us = responses(on_arrival).get("loop", busplan.capacity(on_arrival).results[0].required_us)
     if lasts_us is None:
         return None
     period_us = int(lasts_us) + slack_us
