@@ -4,6 +4,7 @@ import re
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
+from busplan.buses.bus import Bus
 from busplan.buses.limits import Starter
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError, PlacedError
@@ -139,7 +140,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
     text = _HEAD + _MACHINE.format(
         name=value_text(name),
-        bus=_bus(starter, machine),
+        bus=_bus(kind_named(kind), machine),
         ratio=starter.slice_ratio,
         count="" if first.name else _COUNT.format(nodes=first.nodes),
         parts="\n".join(_part(group, machine=machine, starter=starter, file=file) for group in machine.groups),
@@ -150,12 +151,12 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     return _checked(text, name=name)
 
 
-def _bus(starter: Starter, machine: Machine) -> str:
+def _bus(bus: Bus, machine: Machine) -> str:
     """Section [bus]."""
-    section = starter.section(machine.host, machine.variant)
+    section, rate = bus.new_section(machine.host, machine.variant), bus.starter.rate
     if machine.rate is None:
         return section
-    return re.sub(rf"^{starter.rate} = .*$", f"{starter.rate} = {machine.rate}", section, flags=re.MULTILINE)
+    return re.sub(rf"^{rate} = .*$", f"{rate} = {machine.rate}", section, flags=re.MULTILINE)
 
 
 def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) -> str:
@@ -167,7 +168,7 @@ def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) ->
         axes=group.axes,
         payload=_payload(group, bytes_per_axis=machine.bytes_per_axis),
         measure=starter.measure.format(file=file, group=of_group),
-        execution=starter.execution,
+        execution=starter.execution(machine.variant),
         more=starter.node,
     )
 
@@ -187,7 +188,7 @@ def _checked(text: str, *, name: str) -> str:
     try:
         validate(decode(text.encode(), name=name))
     except PlacedError as refused:
-        problems = [problem for problem in refused.placed if problem.key.startswith("group.")]
+        problems = [problem for problem in refused.placed if "." in problem.key]
         if problems:
             raise BusplanError(*(problem.message for problem in problems)) from None
         raise _nameless(name) from None

@@ -122,6 +122,17 @@ def value_at(section: Section, key: str) -> Any:
     return value
 
 
+def beside(key: str, part: str) -> str:
+    """Dotted key beside another one: its grade, its uncertainty, or the cycles of which it is the worst.
+
+    Examples
+    --------
+    >>> beside("bus.master_jitter_us", "cycles"), beside("bus.host_us", "uncertainty_us")
+    ('bus.master_jitter_cycles', 'bus.host_uncertainty_us')
+    """
+    return f"{key.removesuffix('_us')}_{part}"
+
+
 _KEPT: Final = 8
 """Tuples of tables whose names are kept, at most."""
 _named: Final[dict[int, tuple[tuple[Any, ...], dict[str, Any]]]] = {}

@@ -306,6 +306,7 @@ class Limits(Section):
     missed_cycles: SpareCount = Field(
         default=0,
         description="Most cycles of a recording without a frame or SYNC, most PDOs missing or twice, and most error "
-        "frames",
+        "frames; from 1 on the plan, too, accepts one start of a cycle later than the worst of those measured, in as "
+        "many cycles",
         examples=[0],
     )

@@ -135,8 +135,6 @@ class CanCycle(BusCycle):
             lines.append(("queues", queues))
         if self.messages:
             lines.append(("latest message", self._latest_words()))
-        if possible_us := self.possible_us():
-            lines.append(("upper bound", f"{self.bound_words} up to {_short(possible_us)} us; they may wait less"))
         tried = range(int(c.MOST_REPEATED) + 1)
         if fits(self._with_burst(0)):
             repeated = bisect_left(tried, 1, lo=1, key=lambda number: not fits(self._with_burst(number))) - 1
@@ -156,11 +154,6 @@ class CanCycle(BusCycle):
         free = sum(message.deadline_us == NO_DEADLINE_US for message, _ in answers)
         others = f"; {plural(free, 'message')} without a deadline" if free else ""
         return f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}{others}"
-
-    @property
-    def bound_words(self) -> str:
-        """Who may wait less than the bound of the cycle says, in words."""
-        return "messages in queues wait"
 
     def _with_burst(self, repeated: int) -> Network:
         """The network with some repeated frames in a row; 0 without errors."""

@@ -98,6 +98,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
             "can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000",
             "can-motors": _MOTORS,
         },
+        without_wake_up=("can-motors",),
         rate="bit_rate_kbit_s",
         more="""\
 # What else goes over the bus? Without it the load is too small. For example of CANopen nodes, each on its own:
@@ -125,13 +126,13 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough"),
         "bus.data_bit_rate_kbit_s": Key("f_data", meaning="if transceivers and cable carry it"),
         "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit"),
-        "bus.host_us": Key("host"),
+        "bus.host_us": Key("host", role="host"),
         "bus.host_write_us": Key("t_write", meaning="if another adapter or driver is as fast"),
         "bus.host_read_us": Key("t_read", meaning="if another adapter or driver is as fast"),
         "bus.max_frames_s": Key("f_max"),
         "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
         "bus.clock_tolerance": Key("df"),
-        "bus.sync_jitter_us": Key("J_SYNC"),
+        "bus.sync_jitter_us": Key("J_SYNC", role="wake-up"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default="SYNC_IDENTIFIER"),

@@ -16,7 +16,7 @@ from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of, latest_start
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -333,7 +333,7 @@ class _Log:
             yield jitter._replace(note=f"planned: {of_host}the wait for other frames and stuff bits")
             if jitter.verdict == "outside":
                 # All of it may be the host's: what other frames add is not known of any one SYNC.
-                self.edits[key] = ceil(10 * late.value) / 10
+                self.edits |= latest_start(key, ceil(10 * late.value) / 10, events=count, share=self.share)
 
     def _message(
         self, stream: Stream, label: str, recorded: Sequence[can_timing.SentFrames], spread_us: float | None

@@ -30,11 +30,6 @@ class RequestCycle(PdoCycle):
         return self.traffic.access == "burst"
 
     @property
-    def bound_words(self) -> str:
-        """Who may wait less than the bound of the cycle says, in words."""
-        return "frames of a burst wait" if self._is_burst else super().bound_words
-
-    @property
     def takes_at_sync(self) -> bool:
         """No: there is no SYNC to wait for."""
         return False

@@ -12,7 +12,7 @@ from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, S
 from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
 from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, of_node, traffic_of
 from busplan.buses.can.waiting import message_responses
-from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown, WakeUp
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, pointwise, smaller, total, within
@@ -373,6 +373,7 @@ LIMITS: Final = (
     KnownPeriods(),
     KnownSenders(),
     Deadlines(),
+    WakeUp("bus.sync_jitter_us"),
 )
 
 

@@ -98,6 +98,12 @@ class CanBus(BusSection):
         description="Largest delay of SYNC by the host, under the period; it shortens the cycle [us]",
         examples=[50],
     )
+    sync_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
+    )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle; "
@@ -337,6 +343,7 @@ _OF_CYCLE: Final = {
         "sync_identifier",
         "sync_counter",
         "sync_jitter_us",
+        "sync_jitter_cycles",
         "pipeline_cycles",
         "host_us",
         "host_grade",
@@ -347,7 +354,7 @@ _OF_CYCLE: Final = {
     "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
 }
 """Keys of sections that only a network with a cycle has."""
-_OF_SYNC: Final = ("sync_identifier", "sync_counter", "sync_jitter_us")
+_OF_SYNC: Final = ("sync_identifier", "sync_counter", "sync_jitter_us", "sync_jitter_cycles")
 """Keys of section [bus] that only a cycle with SYNC has."""
 _PDO_NAMES: Final = tuple(NAMES.values())
 

@@ -86,6 +86,18 @@ class Ieee1394Bus(BusSection):
         description="Isochronous traffic after each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
         examples=[20],
     )
+    sync_jitter_us: TimeUs = Field(
+        default=0.0,
+        description="Latest start of a cycle by the host; the cycle ends before the next one. Cycle starts are the "
+        "bus's own and stay punctual [us]",
+        examples=[50],
+    )
+    sync_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
+    )
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
         default=None,
         description="Repeat delay of one PHY; without it 14 ticks of the base rate, 0.142 us (TI TSB12LV41: 0.144 us "

@@ -147,11 +147,18 @@ def _at_period(network: Network, meant: Wanted, timing_models: Sequence[str] | N
         having = [model for model in models if figure.key in numbers[model].get(transaction, {})]
         for model in timing_models or having[:1]:
             traced = numbers[model][transaction]
-            for shown in (figure, *_BESIDE.get(figure.key, ())):
+            for shown in (figure, *_least(figure, network.bus, traced), *_BESIDE.get(figure.key, ())):
                 if shown.key in traced:
                     found = _derivation(network, traced[shown.key], meant.command, shown, model, transaction or None)
                     uses = traced.get(MARGIN_CORRECTED.key) if shown.key == MARGIN.key else None
                     yield found if uses is None else replace(found, corrected_us=float(value_of(uses)))
+
+
+def _least(figure: Figure, bus: Bus, traced: _Numbers) -> Iterator[Figure]:
+    """The figure of the lower end of another, where the ends differ."""
+    least = figures_of(bus)["capacity"].get(f"least_{figure.key}")
+    if least and least.key in traced and value_of(traced[least.key]) < value_of(traced[figure.key]):
+        yield least
 
 
 def _derivation(
