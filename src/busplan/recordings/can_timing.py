@@ -16,6 +16,14 @@ LISTED: Final = 6
 """Identifiers that a sentence lists, at most."""
 MOST_BIT_RATE: Final = 1000.0
 """Highest bit rate of classical CAN [kbit/s]."""
+_BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
+"""Usual bit rates [kbit/s]."""
+_NEAR: Final = 0.02
+"""Share by which frames in direct succession may seem to be off a bit rate, by their stamps [1]."""
+_ABOUT: Final = 0.9
+"""Share of a bit rate from which frames seem to be in direct succession [1]."""
+_SHARP: Final = 0.8
+"""Share of those frames at the bit rate itself, if it is that of the bus [1]."""
 _WINDOWS: Final = (10, 20, 30)
 """Numbers of frames over which stamps show a bit rate. Over two, errors of stamps dominate."""
 _LATE_SHARE: Final = 0.05
@@ -56,6 +64,8 @@ class SentFrames(NamedTuple):
     """Whether all CAN FD frames have their data at the data bit rate (BRS)."""
     periods: PeriodicEvents | None
     """Periods of the message; None if it is not periodic."""
+    taken: npt.NDArray[np.int64]
+    """Indexes of the frames in the log."""
 
     @property
     def mean(self) -> Quantile:
@@ -167,6 +177,7 @@ def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tu
             bool(frames.is_fd[taken].any()),
             bool(frames.switched[taken][frames.is_fd[taken]].all()),
             periods,
+            taken,
         )
     return messages
 
@@ -245,6 +256,42 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / MOST_BIT_RATE
         windows, late_us = _WINDOWS, min(at_once_us, _LATEST_US)
     return LeastBitRate(most(windows, late_us), most(windows, _LATEST_US))
+
+
+def require_bit_rate(bit_rate_kbit_s: float, least: LeastBitRate) -> None:
+    """Raise BusplanError for a bit rate at which the frames of a log would overlap [kbit/s]."""
+    if bit_rate_kbit_s < least.surely:
+        raise BusplanError(
+            f"bit rate {bit_rate_kbit_s:g}: frames of the log need at least {least.surely:.3g} kbit/s, because they do "
+            "not overlap"
+        )
+
+
+def possible_bit_rates(least: LeastBitRate) -> list[float]:
+    """Usual bit rates that are no less than a least one [kbit/s]."""
+    return [rate for rate in _BIT_RATES if rate >= least.surely]
+
+
+def shown_bit_rate(frames: CanFrames, stretch: ClockStretch, possible: Sequence[float]) -> float | None:
+    """Least of some bit rates at which frames follow each other; None where none is shown [kbit/s]."""
+    bits, apart_us = frames.bits[stretch.taken][1:], np.diff(stretch.times_us)
+    rates = 1000 * bits / np.maximum(apart_us, _LEAST_US)
+    return next((rate for rate in possible if _is_shown(rate, rates)), None)
+
+
+def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:
+    """Whether frames follow each other as at a bit rate, with hardly any closer or a little later."""
+    near = np.count_nonzero(np.abs(rates / bit_rate_kbit_s - 1) <= _NEAR)
+    return bool(near >= LEAST_EVENTS and near >= _SHARP * np.count_nonzero(rates >= _ABOUT * bit_rate_kbit_s))
+
+
+def late_stamps_us(frames: CanFrames, stretch: ClockStretch, bit_us: float) -> float:
+    """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us]."""
+    sent_us = np.concatenate(([0.0], frames.bits[stretch.taken].cumsum() * bit_us))
+    ahead_us = [wire_us - stretch.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
+    late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
+    # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
+    return late_us + float(frames.bits.max()) * bit_us if late_us > step_us(stretch) else late_us
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:

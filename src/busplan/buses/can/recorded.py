@@ -11,7 +11,8 @@ import numpy as np
 
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
-from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
+from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us
+from busplan.buses.can.logged import wire_times
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
@@ -21,7 +22,7 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, lateness, periodic_events, quantile
+from busplan.recordings.statistics import LEAST_EVENTS, ahead, expanded, lateness, periodic_events, quantile
 
 _NOT_SHOWN: Final = (
     "A log does not show the bit rate, frames that the recorder missed, when a frame was queued, commands that are "
@@ -65,16 +66,8 @@ class _Log:
         self.messages = {message.name: message for message in network.profile.message}
         self.least_bit_rate = can_timing.least_bit_rate(frames, self.stretch)
         self.step_us = can_timing.step_us(self.stretch)
-        self.stamp_error_us = self.step_us + self._late_stamps_us()
+        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(frames, self.stretch, self.bit_us)
         """Largest error of a stamp: the step of stamps, and what frames come closer than the bus allows [us]."""
-
-    def _late_stamps_us(self) -> float:
-        """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us]."""
-        sent_us = np.concatenate(([0.0], self.frames.bits[self.taken].cumsum() * self.bit_us))
-        ahead_us = [wire_us - self.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
-        late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
-        # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
-        return late_us + float(self.frames.bits.max()) * self.bit_us if late_us > self.step_us else late_us
 
     @property
     def has_switch(self) -> bool:
@@ -131,23 +124,6 @@ class _Log:
         most = self.network.profile.limits.missed_cycles
         return _limited(quantity, most, number, events, "limits.missed_cycles", note=note, hidden=hidden)
 
-    def _wire_us(self, *, is_stuffed: bool) -> Floats:
-        """Time of each frame on the wire with the most stuff bits, or with none [us]."""
-        taken = self.taken
-        us = np.zeros(len(taken))
-        nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
-        is_fd, switched = self.frames.is_fd[taken], self.frames.switched[taken]
-        # Without a data bit rate the frames that switch take no time.
-        for places, data_rate in ((~is_fd, 0.0), (is_fd & ~switched, nominal), (is_fd & switched & bool(data), data)):
-            us[places] = frame_us(
-                np.minimum(self.frames.sizes[taken[places]], c.FD_FRAME_BYTES if data_rate else c.FRAME_BYTES),
-                identifier_bits=np.where(self.frames.extended[taken[places]], 29, BASE_BITS),
-                bit_rate_kbit_s=nominal,
-                data_bit_rate_kbit_s=data_rate,
-                is_stuffed=is_stuffed,
-            )
-        return us
-
     def _load(self) -> Iterator[RecordedFigure]:
         """Mean load and that of the fullest second, the planned load, and the frames with the most stuff bits and none.
 
@@ -158,9 +134,10 @@ class _Log:
         is_whole = self.has_switch or not self.frames.switched[self.taken].any()
         if count < 2 or span_us <= 0 or (is_fd.all() and not is_whole):  # noqa: PLR2004 - a distance
             return
-        worst_us, none_us = self._wire_us(is_stuffed=True), self._wire_us(is_stuffed=False)
-        # Of CAN FD the stuff bits are not known: any number of the possible ones.
-        wire_us = np.where(is_fd, (worst_us + none_us) / 2, self.frames.bits[self.taken] * self.bit_us)
+        nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
+        wire_us, worst_us, none_us = wire_times(
+            self.frames, self.taken, bit_rate_kbit_s=nominal, data_bit_rate_kbit_s=data
+        )
         # The first frame ended with its stamp.
         load, worst, none = (float(us[1:].sum()) / span_us for us in (wire_us, worst_us, none_us))
         # A log begins and ends anywhere: it may have a frame more of each identifier than its length has periods.
