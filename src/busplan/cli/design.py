@@ -320,7 +320,8 @@ def measured_command(
         str | None,
         typer.Argument(
             help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, "
-            "BLF or TRC, or a capture of SocketCAN. A CAN log may stand alone, in the place of PROFILE."
+            "BLF or TRC, or a capture of SocketCAN.  [default: none; a CAN log stands in the place of PROFILE]",
+            show_default=False,
         ),
     ] = None,
     quantile: Annotated[

@@ -355,11 +355,11 @@ class _Log:
         if not self._rows:
             why = f" ({self.broken})" if self.broken else ""
             number = len(self._errors) // _ERROR_ROW.size
-            errors = f" but {plural(number, 'error frame')}" if number else ""
+            but = f" but {plural(number, 'error frame')}" if number else ""
             if self._channel is not None and self._channels:
                 names = first_of([*map(_shown, self._channels)], _SHOWN_CHANNELS)
                 raise BusplanError(f"{path}: channel {_shown(self._channel)}: no such channel; there are {names}")
-            raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
+            raise BusplanError(f"{path}: has no CAN frame{but}{why}")
         if len(self._channels) > 1 and self._channel is None:
             counts = self._channels.most_common()
             named = first_of(

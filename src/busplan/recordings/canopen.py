@@ -47,7 +47,7 @@ class Emergency(NamedTuple):
     """Error code; 0 says that an error is over."""
     register: int
     """Error register, object 0x1001."""
-    count: int
+    messages: int
     first: int
     """Index of the first one in the log."""
     last: int

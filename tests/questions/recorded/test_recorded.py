@@ -79,7 +79,7 @@ def test_emergencies_have_node_code_register_and_moment(tmp_path: Path) -> None:
     queued += [Queued(us, 0x80 + node, data + bytes(5)) for us, node, data in faults]
     found = of_log(arbitrated(queued), tmp_path)
     shown = [
-        (one.node, one.error_code, one.register, one.count, one.first_frame, one.last_frame)
+        (one.node, one.error_code, one.register, one.messages, one.first_frame, one.last_frame)
         for one in found.emergencies
     ]
     assert shown == [(3, 0x8210, 0x11, 2, 12, 23), (3, 0, 0, 1, 44, 44), (9, 0x4300, 4, 1, 55, 55)]

@@ -1,12 +1,13 @@
 """What a CAN log has: identifiers, when they come, the load of the bus, errors, and what the stamps show."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from busplan.buses.can.equations import BASE_BITS, USUAL_DATA_BIT_RATE, bit_us
 from busplan.buses.can.logged import wire_times
@@ -76,7 +77,7 @@ class RecordedEmergency(NamedTuple):
     """0 says that an error is over."""
     register: int
     """Error register."""
-    count: int
+    messages: int
     first_s: float
     first_frame: int
     last_s: float
@@ -86,6 +87,23 @@ class RecordedEmergency(NamedTuple):
 class _Moment(NamedTuple):
     at_s: float
     frame: int
+
+
+_Ends: TypeAlias = tuple[float | None, int | None]
+
+
+class _Gaps(NamedTuple):
+    """When frames of an identifier come: fields of a `RecordedIdentifier`."""
+
+    comes: Comes
+    period_us: float | None = None
+    missing: int = 0
+    burst: int | None = None
+    median_us: float | None = None
+    least_us: float | None = None
+    largest_us: float | None = None
+    largest_s: float | None = None
+    largest_frame: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,8 +220,9 @@ class _Log:
         frames, stretch = self.frames, self.stretch
         gaps_us = np.diff(stretch.times_us)
         widest = int(gaps_us.argmax()) if len(gaps_us) else None
-        gap = (None, None) if widest is None else self._at(int(stretch.taken[widest + 1]))
-        errors = [*map(self._error, (0, -1))] if frames.errors else [(None, None)] * 2
+        none: _Ends = (None, None)
+        gap: _Ends = none if widest is None else self._at(int(stretch.taken[widest + 1]))
+        first_error, last_error = (self._error(place) if frames.errors else none for place in (0, -1))
         possible = {} if self.rate else {rate: self._fullest(self._wire_us(rate)) for rate in self.possible}
         return LogContents(
             day_of(int(frames.start_s * 1e9)),
@@ -220,8 +239,8 @@ class _Log:
             None if widest is None else _rounded(gaps_us[widest]),
             *gap,
             frames.errors,
-            *errors[0],
-            *errors[1],
+            *first_error,
+            *last_error,
             frames.dropped,
             frames.remote,
             can_timing.step_us(stretch) if len(gaps_us) else 0.0,
@@ -233,7 +252,7 @@ class _Log:
             bool(frames.synthetic),
         )
 
-    def _error(self, place: int) -> tuple[float | None, int]:
+    def _error(self, place: int) -> _Ends:
         at_us = float(self.frames.errors_us[place])
         # A text of candump may give error frames no time.
         is_known = -can_timing.WINDOW_US <= at_us <= float(self.frames.times_us.max()) + can_timing.WINDOW_US
@@ -246,7 +265,7 @@ class _Log:
         wire_us[self.stretch.taken] = self.wire_us
         found = []
         for sent in self.messages.values():
-            own_us = wire_us[sent.taken]
+            own_us = float(wire_us[sent.taken].sum())
             role = canopen.role(sent) if self.canopen else None
             found.append(
                 RecordedIdentifier(
@@ -256,37 +275,34 @@ class _Log:
                     role and role.name,
                     role and role.node,
                     len(sent.taken),
-                    **self._timing(sent),
-                    least_bytes=int(self.frames.sizes[sent.taken].min()),
-                    most_bytes=sent.most_bytes,
-                    load=float(own_us.sum()) / self.stretch.length_us if self.rate and self.stretch.length_us else None,
-                    share=float(own_us.sum()) / all_us if is_shared and all_us else None,
-                    **dict(zip(("first_s", "first_frame"), self._at(int(sent.taken[0])), strict=True)),
-                    **dict(zip(("last_s", "last_frame"), self._at(int(sent.taken[-1])), strict=True)),
+                    *self._gaps(sent),
+                    int(self.frames.sizes[sent.taken].min()),
+                    sent.most_bytes,
+                    own_us / self.stretch.length_us if self.rate and self.stretch.length_us else None,
+                    own_us / all_us if is_shared and all_us else None,
+                    *self._at(int(sent.taken[0])),
+                    *self._at(int(sent.taken[-1])),
                 )
             )
         return found
 
-    def _timing(self, sent: can_timing.SentFrames) -> dict[str, object]:
-        """When frames of an identifier come."""
-        gaps_us = np.diff(sent.times_us)
+    def _gaps(self, sent: can_timing.SentFrames) -> _Gaps:
+        gaps_us, periods = np.diff(sent.times_us), sent.periods
         if not len(gaps_us):
-            return dict.fromkeys(_TIMING) | {"comes": "once", "missing": 0}
+            return _Gaps("once")
         is_close = gaps_us < _CLOSE * self.stretch.length_us / len(gaps_us)
-        comes: Comes = "cyclic" if sent.periods else "burst" if is_close.mean() >= _BURSTS else "event"
+        comes: Comes = "cyclic" if periods else "burst" if is_close.mean() >= _BURSTS else "event"
         widest = int(gaps_us.argmax())
-        at = self._at(int(sent.taken[widest + 1]))
-        return {
-            "comes": comes,
-            "period_us": sent.mean.value if sent.periods else None,
-            "missing": sent.periods.missing if sent.periods else 0,
-            "burst": _longest_row(is_close) + 1 if comes == "burst" else None,
-            "median_gap_us": _rounded(np.median(gaps_us)),
-            "least_gap_us": _rounded(gaps_us.min()),
-            "largest_gap_us": _rounded(gaps_us[widest]),
-            "largest_gap_s": at.at_s,
-            "largest_gap_frame": at.frame,
-        }
+        return _Gaps(
+            comes,
+            sent.mean.value if periods else None,
+            periods.missing if periods else 0,
+            _longest_row(is_close) + 1 if comes == "burst" else None,
+            _rounded(np.median(gaps_us)),
+            _rounded(gaps_us.min()),
+            _rounded(gaps_us[widest]),
+            *self._at(int(sent.taken[widest + 1])),
+        )
 
     def _emergencies(self) -> list[RecordedEmergency]:
         if not self.canopen:
@@ -308,25 +324,12 @@ class _Log:
         return remarks
 
 
-_TIMING: Final = (
-    "comes",
-    "period_us",
-    "missing",
-    "burst",
-    "median_gap_us",
-    "least_gap_us",
-    "largest_gap_us",
-    "largest_gap_s",
-    "largest_gap_frame",
-)
-
-
-def _rounded(us: float | np.floating) -> float:
+def _rounded(us: np.floating[Any] | float) -> float:
     """A time without the error of its subtraction [us]."""
     return round(float(us), 3)
 
 
-def _longest_row(flags: Sequence[bool] | np.ndarray) -> int:
+def _longest_row(flags: npt.NDArray[np.bool_]) -> int:
     """Length of the longest row of true flags."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([0], np.asarray(flags, dtype=np.int8), [0]))))
+    ends = np.flatnonzero(np.diff(np.concatenate(([0], flags, [0]))))
     return int((ends[1::2] - ends[::2]).max(initial=0))

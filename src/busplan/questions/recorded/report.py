@@ -125,7 +125,7 @@ def _emergencies(contents: LogContents) -> Iterator[blocks.Block]:
     if not contents.emergencies:
         yield blocks.Sentence(("No emergency.",))
         return
-    number, nodes = sum(one.count for one in contents.emergencies), {one.node for one in contents.emergencies}
+    number, nodes = sum(one.messages for one in contents.emergencies), {one.node for one in contents.emergencies}
     words = blocks.Words(f"{number:,} emergenc{'y' if number == 1 else 'ies'}", "fails")
     rows = tuple(
         blocks.TableRow(_emergency(one), is_detail=place >= _SHOWN) for place, one in enumerate(contents.emergencies)
@@ -139,7 +139,7 @@ def _emergency(one: RecordedEmergency) -> tuple[blocks.Cell, ...]:
         blocks.ShownValue(one.node, "node"),
         f"0x{one.error_code:04X}",
         f"0x{one.register:02X}",
-        blocks.ShownValue(one.count, "count", grouped=True),
+        blocks.ShownValue(one.messages, "messages", grouped=True),
         blocks.ShownValue(one.first_s, "first_s", "s", 6, fixed=True),
         blocks.ShownValue(one.first_frame, "first_frame"),
         blocks.ShownValue(one.last_s, "last_s", "s", 6, fixed=True),
