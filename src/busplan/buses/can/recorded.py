@@ -12,7 +12,9 @@ import numpy as np
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us
+from busplan.buses.can.exchanges import RequestLog
 from busplan.buses.can.logged import wire_times
+from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
@@ -163,7 +165,8 @@ class _Log:
 
     def _cycles(self, sent_streams: Sequence[Stream]) -> Iterator[RecordedFigure]:
         """SYNCs and PDOs that are missing, and the last PDO after its SYNC."""
-        if not self.traffic.has_cycle:
+        if not self.traffic.has_sync:
+            yield from self._requests()
             return
         sync, *others = sent_streams
         is_extended = sync.identifier_bits > BASE_BITS
@@ -206,6 +209,21 @@ class _Log:
                 len(behind_us),
                 "cycle.period_us",
             )
+
+    def _requests(self) -> Iterator[RecordedFigure]:
+        """Requests and answers of a cycle without SYNC."""
+        if not isinstance(self.cycle, RequestCycle):
+            return
+        log = RequestLog(
+            self.cycle,
+            self.frames,
+            self.stretch,
+            self.by_identifier,
+            share=self.share,
+            stamp_error_us=self.stamp_error_us,
+        )
+        yield from log.figures(self._missed)
+        self.edits |= log.edits
 
     def _with_stamps(self, *uncertainties: float) -> float | None:
         """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""
