@@ -20,13 +20,20 @@ from busplan.extras import require_extra
 from busplan.files import require_regular
 from busplan.progress import Progress
 from busplan.recordings.capture import SOCKETCAN, CaptureNotes, is_capture, packets
-from busplan.recordings.statistics import Floats
+from busplan.recordings.statistics import Events, Floats
 from busplan.recordings.written import SYNTHETIC
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
-_ROW: Final = Struct("<dIQBB")
+_ROW: Final = Struct("<dIIQBB")
 _ROW_FIELDS: Final = np.dtype(
-    [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
+    [
+        ("stamp_s", "<f8"),
+        ("number", "<u4"),
+        ("identifier", "<u4"),
+        ("data", "<u8"),
+        ("dlc", "u1"),
+        ("flags", "u1"),
+    ]
 )
 """Data type of a frame while a log is read."""
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader"}
@@ -35,7 +42,7 @@ _FORMATS: Final = "text of candump, Vector's ASC and BLF, PEAK's TRC, captures o
 _LINE: Final = re.compile(
     r"(?:\([ \t]*(?P<stamp>[^\s)]+)\)[ \t]+)?(?P<channel>\S+)[ \t]+(?:(?P<frame>[0-9A-Fa-f]+#\S*)(?: [RT])?|"
     r"(?:[RT]X (?P<switch>[B-]) [E-] +)?(?P<identifier>[0-9A-F]{3}|[0-9A-F]{8}) +\[(?P<size>\d{1,2})\] *"
-    r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *'.*')?)"
+    r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *(?:'.*'|ERRORFRAME))?)"
 )
 """Line of `candump -l`, or of candump's output on a terminal."""
 _CLASSICAL_SIZE: Final = 1
@@ -87,10 +94,14 @@ class CanFrames(NamedTuple):
     """Stamp of the first frame [s], since 1970 if the log says so."""
     times_us: Floats
     """Stamps after the first one [us]."""
+    numbers: npt.NDArray[np.uint32]
+    """Number of each frame among all of the log, from 1; of a capture that of the packet."""
     identifiers: npt.NDArray[np.int64]
     extended: npt.NDArray[np.bool_]
     sizes: npt.NDArray[np.int64]
     """Data bytes by the DLC; 8 for a DLC of 9 to 15 in a classical frame [bytes]."""
+    data: npt.NDArray[np.uint64]
+    """First 8 bytes of data, the first one in the highest bits; 0 where there are fewer."""
     bits: npt.NDArray[np.int64]
     """Bits on the wire, interframe space included; 0 for a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
@@ -102,8 +113,22 @@ class CanFrames(NamedTuple):
     """Number of error frames, which are not among the n. Remote frames are."""
     broken: str
     """Reason why the log ends early; empty for a whole one."""
+    lead_us: float = 0.0
+    """Time from the first frame of the log, of any channel, to the first of these [us]."""
+    first_error: tuple[float, int] | None = None
+    """Stamp after that of the first frame [us], and number, of the first error frame; None without one."""
     synthetic: str = ""
     """Words of the log on its emulation; empty without them."""
+
+    def events(self, values: Floats, frames: npt.NDArray[np.int64]) -> Events:
+        """Events of some values, each of a frame by its index."""
+        return Events(values, (self.times_us[frames] + self.lead_us) / 1e6, self.numbers[frames])
+
+    def error_events(self) -> Events:
+        """The first error frame, or no event."""
+        errors = [] if self.first_error is None else [self.first_error]
+        times_us, numbers = (np.array([error[part] for error in errors]) for part in (0, 1))
+        return Events(np.ones(len(errors)), (times_us + self.lead_us) / 1e6, numbers.astype(np.int64))
 
 
 def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> CanFrames:
@@ -142,7 +167,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
                 reader = _bounded_blf()(file)
             else:
                 reader = getattr(can, name)(cast("Any", _Lines(file)))
-            log.read(reader, lambda: progress(min(file.tell(), size), size))
+            log.read(enumerate(reader, start=1), lambda: progress(min(file.tell(), size), size))
     except _DamageError as error:
         log.broken = str(error)
     except BusplanError:
@@ -177,6 +202,8 @@ class _CandumpText(_Lines):
         super().__init__(file)
         self._path = path
         self._has_begun = False
+        self._last = "(0.0) can"
+        """Stamp and channel of the last frame, for an error frame without them."""
 
     def __iter__(self) -> Iterator[str]:
         for number, content in enumerate(super().__iter__(), start=1):
@@ -188,7 +215,7 @@ class _CandumpText(_Lines):
         match = _LINE.fullmatch(line)
         if match is None:
             if "ERRORFRAME" in line:
-                return f"(0.0) can {_ERROR_FRAME}#"
+                return f"{self._last} {_ERROR_FRAME}#"
             if not self._has_begun:
                 raise BusplanError(f"{self._path}: is not a CAN log in a known format: {_FORMATS}")
             raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
@@ -201,7 +228,8 @@ class _CandumpText(_Lines):
             mark = f"##{int(match['switch'] == 'B')}" if is_fd else "#"
             content = f"R{match['size']}" if data.startswith("r") else data
             frame = f"{match['identifier']}{mark}{content}"
-        return f"({match['stamp']}) {match['channel']} {frame}"
+        self._last = f"({match['stamp']}) {match['channel']}"
+        return f"{self._last} {frame}"
 
 
 class _CapturedFrame(NamedTuple):
@@ -219,17 +247,18 @@ class _CapturedFrame(NamedTuple):
     data: bytes
 
 
-def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_CapturedFrame]:
-    """Frames of a SocketCAN capture."""
+def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[tuple[int, _CapturedFrame]]:
+    """Frames of a SocketCAN capture, each with the number of its packet."""
     notes = CaptureNotes()
     for piece in packets(path, notes, link=SOCKETCAN, progress=progress):
         content = piece.content.tobytes()
-        for start, size, stamp_ns in zip(piece.starts, piece.sizes, piece.times_ns, strict=True):
+        log.start_s = None if notes.start_ns is None else notes.start_ns / 1e9
+        for start, size, stamp_ns, number in zip(*piece[1:], strict=True):
             if size < _PACKET.size:
                 continue
             flagged, length, flags = _PACKET.unpack_from(content, start)
             is_extended = bool(flagged & _EXTENDED_FLAG)
-            yield _CapturedFrame(
+            frame = _CapturedFrame(
                 int(stamp_ns) / 1e9,
                 0,
                 flagged & ((1 << 29 if is_extended else 1 << 11) - 1),
@@ -241,6 +270,7 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_Captured
                 length,
                 content[start + _PACKET.size : start + min(size, _PACKET.size + length)],
             )
+            yield int(number), frame
         if len(notes.interfaces) > 1:
             raise BusplanError(f"{path}: has frames of {len(notes.interfaces)} interfaces; export those of one bus")
     log.synthetic = notes.synthetic
@@ -295,18 +325,26 @@ class _Log:
         self._rows = bytearray()
         self._channels: Counter[object] = Counter()
         self._errors = 0
+        self.start_s: float | None = None
+        """Stamp of the first frame of any channel [s]."""
+        self._first_error: tuple[float, int] | None = None
+        """Stamp [s] and number of the first error frame."""
         self.broken = self.synthetic = ""
 
-    def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
-        """Store all messages."""
-        number, last_s = 0, None
-        for message in messages:
-            number += 1
+    def read(self, messages: Iterator[tuple[int, Any]], report: Callable[[], None]) -> None:
+        """Store all messages, each given with its number."""
+        last_s = None
+        for number, message in messages:
             if not number % _REPORT_EVERY:
                 with suppress(OSError, ValueError):
                     report()
+            has_stamp = 0 <= message.timestamp < _END_S
+            if self.start_s is None and has_stamp:
+                self.start_s = message.timestamp
             if message.is_error_frame:
                 self._errors += 1
+                if self._first_error is None and has_stamp:
+                    self._first_error = message.timestamp, number
                 continue
             _require_frame(message, last_s)
             last_s = message.timestamp
@@ -323,6 +361,7 @@ class _Log:
             is_switched = is_fd and message.bitrate_switch
             self._rows += _ROW.pack(
                 last_s,
+                number,
                 message.arbitration_id,
                 int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"),
                 message.dlc,
@@ -351,18 +390,23 @@ class _Log:
         identifiers, sizes = rows["identifier"].astype(np.int64), rows["dlc"].astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
         extended, remote, fd, switched = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD, _SWITCHED))
+        first_error = self._first_error and ((self._first_error[0] - stamps[0]) * 1e6, self._first_error[1])
         return CanFrames(
             float(stamps[0]),
             (stamps - stamps[0]) * 1e6,
+            rows["number"].copy(),
             identifiers,
             extended,
             np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
+            rows["data"].copy(),
             np.where(fd, 0, written_bits(identifiers, extended, remote, codes, rows["data"])),
             fd,
             switched,
             int(np.count_nonzero(remote)),
             self._errors,
             self.broken,
+            float(stamps[0] - (stamps[0] if self.start_s is None else self.start_s)) * 1e6,
+            first_error,
             self.synthetic or f"{SYNTHETIC} by the name of its channel" * (SYNTHETIC in self._channels),
         )
 
