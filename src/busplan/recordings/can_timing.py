@@ -56,6 +56,8 @@ class SentFrames(NamedTuple):
     identifier: int
     extended: bool
     """Whether the identifier has 29 bits."""
+    frames: npt.NDArray[np.int64]
+    """Index of each frame in the log."""
     times_us: Floats
     most_bytes: int
     is_fd: bool
@@ -64,8 +66,6 @@ class SentFrames(NamedTuple):
     """Whether all CAN FD frames have their data at the data bit rate (BRS)."""
     periods: PeriodicEvents | None
     """Periods of the message; None if it is not periodic."""
-    taken: npt.NDArray[np.int64]
-    """Indexes of the frames in the log."""
 
     @property
     def mean(self) -> Quantile:
@@ -172,12 +172,12 @@ def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tu
         messages[identifier, bool(extended)] = SentFrames(
             identifier,
             bool(extended),
+            taken,
             times_us,
             int(frames.sizes[taken].max()),
             bool(frames.is_fd[taken].any()),
             bool(frames.switched[taken][frames.is_fd[taken]].all()),
             periods,
-            taken,
         )
     return messages
 
@@ -190,24 +190,25 @@ def _is_periodic(periods: PeriodicEvents, length_us: float) -> bool:
     return is_row and is_even
 
 
-def fullest_load(times_us: Floats, wire_us: Floats) -> float:
-    """Load of the fullest second, or of all of a shorter log, whose first frame ended with its stamp [1].
+def second_loads(times_us: Floats, wire_us: Floats) -> Floats:
+    """Load of the second from each frame on, or of all of a shorter log, whose first frame ended with its stamp [1].
 
-    Of n frames, stamps are ascending and not all alike, and `wire_us` are the times on the wire [us].
+    Of n frames, stamps are ascending and not all alike, and `wire_us` are the times on the wire [us]. The result has
+    shape (n,), or (1,) for a shorter log.
 
     Examples
     --------
-    >>> fullest_load(np.array([0.0, 0.5e6, 1.2e6, 2.3e6]), np.array([100.0, 200, 300, 400]))
+    >>> float(second_loads(np.array([0.0, 0.5e6, 1.2e6, 2.3e6]), np.array([100.0, 200, 300, 400])).max())
     0.0005
-    >>> fullest_load(np.array([0.0, 1e3]), np.array([100.0, 200]))
-    0.2
+    >>> second_loads(np.array([0.0, 1e3]), np.array([100.0, 200])).tolist()
+    [0.2]
     """
     span_us = float(times_us[-1] - times_us[0])
     if span_us < WINDOW_US:
-        return float(wire_us[1:].sum()) / span_us
+        return np.array([float(wire_us[1:].sum()) / span_us])
     sent_us = np.concatenate(([0.0], np.cumsum(wire_us)))
     ends = np.searchsorted(times_us, times_us + WINDOW_US, side="left")
-    return float((sent_us[ends] - sent_us[:-1]).max()) / WINDOW_US
+    return np.asarray(sent_us[ends] - sent_us[:-1]) / WINDOW_US
 
 
 def step_us(stretch: ClockStretch) -> float:
@@ -228,6 +229,8 @@ class LeastBitRate(NamedTuple):
     """Bound for stamps as late as with most drivers."""
     surely: float
     """Bound for stamps up to a millisecond late."""
+    rates: Floats
+    """Likely bound from the frames from each frame of the stretch on, n of them; 0 where too few follow."""
 
 
 def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
@@ -245,8 +248,12 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
         return np.asarray(1000 * between / np.maximum(window_us, _LEAST_US), dtype=np.float64)
 
-    def most(windows: Sequence[int], late_us: float) -> float:
-        return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
+    def most(windows: Sequence[int], late_us: float) -> Floats:
+        of_first = np.zeros(len(bits))
+        for count in windows:
+            if len(bits) > count:
+                np.maximum(of_first[:-count], rates(count, late_us), out=of_first[:-count])
+        return of_first
 
     closer = rates(1, 0.0) > MOST_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
     windows: Sequence[int] = (4, *_WINDOWS)
@@ -255,7 +262,8 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
         at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / MOST_BIT_RATE
         windows, late_us = _WINDOWS, min(at_once_us, _LATEST_US)
-    return LeastBitRate(most(windows, late_us), most(windows, _LATEST_US))
+    likely = most(windows, late_us)
+    return LeastBitRate(float(likely.max()), float(most(windows, _LATEST_US).max()), likely)
 
 
 def require_bit_rate(bit_rate_kbit_s: float, least: LeastBitRate) -> None:

@@ -1,4 +1,4 @@
-"""CANopen in a log: what its predefined connection set calls an identifier, and emergency messages (CiA 301)."""
+"""CANopen in a log: what its predefined connection set calls an identifier (CiA 301)."""
 
 from collections.abc import Iterable
 from types import MappingProxyType
@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.recordings.can import CanFrames
-from busplan.recordings.can_timing import ClockStretch, SentFrames
+from busplan.recordings.can_timing import SentFrames
 
 NMT, SYNC, TIME = "NMT", "SYNC", "TIME"
 EMERGENCY, HEARTBEAT, SDO_ANSWER, SDO_REQUEST = "emergency", "heartbeat", "SDO answer", "SDO request"
@@ -39,20 +39,6 @@ class Role(NamedTuple):
     """Node-ID; None for a message of no node."""
 
 
-class Emergency(NamedTuple):
-    """Emergency messages of one node with one error."""
-
-    node: int
-    error_code: int
-    """Error code; 0 says that an error is over."""
-    register: int
-    """Error register, object 0x1001."""
-    messages: int
-    first: int
-    """Index of the first one in the log."""
-    last: int
-
-
 def role(sent: SentFrames) -> Role | None:
     """What the predefined connection set calls a message of this identifier and length; None where it has no name."""
     if sent.extended or sent.is_fd:
@@ -74,26 +60,8 @@ def is_likely(messages: Iterable[SentFrames], frames: CanFrames) -> bool:
             continue
         if what.name == SYNC:
             return True
-        states = (frames.data[sent.taken] >> np.uint64(56)).astype(np.int64) & ~_TOGGLE
+        states = (frames.data[sent.frames] >> np.uint64(56)).astype(np.int64) & ~_TOGGLE
         if what.name == HEARTBEAT and np.isin(states, _STATES).all():
             return True
         found.add(what)
     return any(Role(SDO_REQUEST, what.node) in found for what in found if what.name == SDO_ANSWER)
-
-
-def emergencies(frames: CanFrames, stretch: ClockStretch) -> list[Emergency]:
-    """Emergency messages of a log by node, error code and register, in the order of their first ones."""
-    taken = stretch.taken
-    identifiers = frames.identifiers[taken]
-    is_emergency = (identifiers > 0x080) & (identifiers <= 0x080 + _NODE_BITS) & (frames.sizes[taken] == 8)  # noqa: PLR2004
-    taken = taken[is_emergency & ~frames.extended[taken] & ~frames.is_fd[taken]]
-    data = [(frames.data[taken] >> np.uint64(shift)).astype(np.int64) & 0xFF for shift in (56, 48, 40)]
-    nodes = frames.identifiers[taken] & _NODE_BITS
-    keys = nodes << 24 | data[1] << 16 | data[0] << 8 | data[2]
-    found = []
-    order = np.argsort(keys, kind="stable")
-    for places in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1) if len(keys) else ():
-        key = int(keys[places[0]])
-        ends = int(taken[places[0]]), int(taken[places[-1]])
-        found.append(Emergency(key >> 24, key >> 8 & 0xFFFF, key & 0xFF, len(places), *ends))
-    return sorted(found, key=lambda emergency: emergency.first)

@@ -1,6 +1,6 @@
 """Requests and answers of a CAN log without SYNC: cycles, what is missing, and the times of nodes and host."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil
 from typing import Any, Final, NamedTuple
 
@@ -11,8 +11,9 @@ from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, bit_us
 from busplan.buses.can.logged import wire_times
 from busplan.buses.can.pdos import PdoCycle
-from busplan.buses.can.streams import place, streams
-from busplan.buses.can.traffic import NAMES, of_node
+from busplan.buses.can.recorded_cycles import Senders
+from busplan.buses.can.streams import place
+from busplan.buses.can.traffic import NAMES
 from busplan.buses.network import Group
 from busplan.buses.rule import CLOCK_TOLERANCE, RecordedFigure
 from busplan.english import first_of
@@ -23,13 +24,15 @@ from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded, period
 Places = npt.NDArray[np.int64]
 _SPACE_BITS: Final = 3
 """Bits between two frames (ISO 11898-1), which a stamp at the end of a frame may leave out."""
+_MOST: Final = 0.5
+"""Share of the times of a node that no other frame may hide, at least, so that they show its execution time [1]."""
 _NOTHING: Final[Places] = np.zeros(0, dtype=np.int64)
 
 
 class _Node(NamedTuple):
     """A node of the plan that answers requests."""
 
-    label: str
+    name: str
     group: Group
     requests: tuple[int, ...]
     """Identifiers of the frames of its request, in their order."""
@@ -51,13 +54,18 @@ class _Exchanges(NamedTuple):
     """Last frame of each request."""
     end: Places
     """Last frame of each answer; -1 without one."""
+    begin: Places
+    """First frame of each of m answers."""
     least_us: Floats
-    """Time of each answer that is surely the node's own: without what other frames may have made it wait [us]."""
+    """Time of each of these that is surely the node's own: without what other frames may have made it wait [us]."""
     is_exact: npt.NDArray[np.bool_]
     """Whether no other frame may have made it wait."""
     due: int
-    missing: int
-    twice: int
+    """Answers that were due."""
+    missing: Places
+    """Last frame of each request without an answer."""
+    twice: Places
+    """Last frame of each answer that came again."""
 
 
 class RequestLog:
@@ -70,10 +78,12 @@ class RequestLog:
         stretch: can_timing.ClockStretch,
         by_identifier: Mapping[tuple[int, bool], can_timing.SentFrames],
         *,
+        senders: Senders,
         share: float,
         stamp_error_us: float,
     ) -> None:
         self.cycle, self.traffic, self.network = cycle, cycle.traffic, cycle.network
+        self.frames, self.taken, self.senders = frames, stretch.taken, senders
         self.share, self.times_us = share, stretch.times_us
         bit = bit_us(self.traffic.bit_rate_kbit_s)
         self.error_us = stamp_error_us + _SPACE_BITS * bit
@@ -93,44 +103,40 @@ class RequestLog:
         self.edits: dict[str, Any] = {}
 
     def _nodes(self, group: Group) -> Iterator[_Node]:
-        sent = [stream for stream in streams(self.traffic) if stream.group == group.name and not stream.is_message]
+        sent = [stream for stream in self.senders.sent if stream.group == group.name and not stream.is_message]
         both = [[stream for stream in sent if stream.name == NAMES[kind]] for kind in ("write", "read")]
-        labels = [
-            f"{member.name or 'node'} {number + 1}".removesuffix(" 1" if member.name and count == 1 else "\n")
-            for member in group.members
-            for count in [member.nodes * int(of_node(group))]
-            for number in range(count)
-        ]
-        for number, label in enumerate(labels):
+        for number in range(int(both[0][0].identifiers)):
             requests, answers = (tuple(int(stream.first) + number for stream in way) for way in both)
-            yield _Node(label, group, requests, answers)
+            yield _Node(self.senders.node(both[0][0], number), group, requests, answers)
+
+    def _located(self, figure: RecordedFigure, places: Places, values: Floats | None = None) -> RecordedFigure:
+        """The figure with the moments of frames, by their values, or of frames that are counted."""
+        counted = np.ones(len(places)) if values is None else values
+        return figure.located(self.frames.events(counted, self.taken[places]))
 
     def _places(self, identifier: int) -> Places:
         sent = self._by_identifier.get((identifier, self.traffic.identifier_bits > BASE_BITS))
-        return _NOTHING if sent is None else self._position[sent.taken]
+        return _NOTHING if sent is None else self._position[sent.frames]
 
     def _exchanges(self, node: _Node) -> _Exchanges:
         """Requests of a node with their answers: two behind one request, where one before had none, are late."""
         last = self._places(node.requests[-1])
         firsts, begins, ends = (self._places(way) for way in (node.requests[0], node.answers[0], node.answers[-1]))
         if not len(last):
-            return _Exchanges(last, last, last, np.zeros(0), np.zeros(0, dtype=np.bool_), 0, 0, 0)
+            return _Exchanges(last, last, last, last, np.zeros(0), np.zeros(0, dtype=np.bool_), 0, last, last)
         at = np.searchsorted(firsts, last, side="right") - 1
         first = np.where(at >= 0, firsts[np.maximum(at, 0)], last) if len(firsts) else last
         answered = due_pdos(self.times_us[last], self.times_us[ends], every=1)
         end = np.full(len(last), -1)
         requests, chosen = np.unique(answered.cycles, return_index=True)
-        end[requests] = self._behind(last, ends)[chosen]
+        end[requests] = ends[answered.pdos[chosen]]
         begun = due_pdos(self.times_us[last], self.times_us[begins], every=1)
         requests, chosen = np.unique(begun.cycles, return_index=True)
-        begin = self._behind(last, begins)[chosen]
+        begin = begins[begun.pdos[chosen]]
         ready_us, is_exact = self._ready_us(begin, last[requests])
         least_us = np.maximum(ready_us - self.times_us[last[requests]], 0.0)
-        return _Exchanges(first, last, end, least_us, is_exact, answered.due, answered.missing, answered.twice)
-
-    def _behind(self, requests: Places, answers: Places) -> Places:
-        """Answers that come behind the first request, as `due_pdos` takes them."""
-        return answers[self.times_us[answers] >= self.times_us[requests[0]]]
+        missing, twice = last[answered.missing], ends[answered.twice]
+        return _Exchanges(first, last, end, begin, least_us, is_exact, answered.due, missing, twice)
 
     def _ready_us(self, frames: Places, floors: Places) -> tuple[Floats, npt.NDArray[np.bool_]]:
         """Instant at which each frame was not yet queued, or just queued, no sooner than that of its floor [us].
@@ -161,13 +167,19 @@ class RequestLog:
             yield missed("answers missing", None, 0, hidden=f"fewer than {LEAST_EVENTS} requests")
             return
         yield from self._cycles(requests, missed)
+        due = sum(found.due for found in self.found)
         for name in ("missing", "twice"):
-            counts = [getattr(found, name) for found in self.found]
-            notes = [f"{count:,} of {node.label}" for node, count in zip(self.nodes, counts, strict=True) if count]
-            due = sum(found.due for found in self.found)
-            yield missed(f"answers {name}", sum(counts), due, note=first_of(notes, can_timing.LISTED))
+            yield self._counted(f"answers {name}", [getattr(found, name) for found in self.found], due, missed)
         yield from self._node_times()
         yield from self._host(requests)
+
+    def _counted(
+        self, quantity: str, places: Sequence[Places], due: int, missed: Callable[..., RecordedFigure]
+    ) -> RecordedFigure:
+        """A number of frames that are missing or come twice, of each node."""
+        notes = [f"{len(each):,} of {node.name}" for node, each in zip(self.nodes, places, strict=True) if len(each)]
+        every = np.concatenate(places)
+        return self._located(missed(quantity, len(every), due, note=first_of(notes, can_timing.LISTED)), every)
 
     def _requests(self) -> "_Requests":
         """All requests in the order of the log, cut into cycles."""
@@ -206,21 +218,21 @@ class RequestLog:
         clocks_us = float(CLOCK_TOLERANCE * planned_us / 3**0.5)
         doubt_us = expanded(mean.uncertainty, clocks_us, self.error_us / count)
         yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
-        yield missed("cycles without requests", periods.missing, int(periods.places[-1]) + 1)
+        skipped = np.flatnonzero(np.diff(periods.places) > 1) + 1
+        figure = missed("cycles without requests", periods.missing, int(periods.places[-1]) + 1)
+        yield self._located(figure, requests.first[opening[skipped]])
         cycles = np.arange(periods.places[-1] + 1)
         grid_us, is_sent = np.interp(cycles, periods.places, starts_us), np.isin(cycles, periods.places)
-        due, notes = 0, dict[str, list[str]](missing=[], twice=[])
-        counts = dict.fromkeys(notes, 0)
+        opened = np.zeros(len(cycles), dtype=np.int64)
+        opened[periods.places] = requests.first[opening]
+        due, missing, twice = 0, list[Places](), list[Places]()
         for node, found in zip(self.nodes, self.found, strict=True):
-            times_us = self.times_us[found.last]
-            pdos = due_pdos(grid_us, times_us, every=int(node.group.every), is_sent=is_sent)
-            due += pdos.due
-            for name in notes:
-                if number := getattr(pdos, name):
-                    counts[name] += number
-                    notes[name].append(f"{number:,} of {node.label}")
-        for name, words in notes.items():
-            yield missed(f"requests {name}", counts[name], due, note=first_of(words, can_timing.LISTED))
+            sent = due_pdos(grid_us, self.times_us[found.last], every=int(node.group.every), is_sent=is_sent)
+            due += sent.due
+            missing.append(opened[sent.missing])
+            twice.append(found.last[sent.twice])
+        yield self._counted("requests missing", missing, due, missed)
+        yield self._counted("requests twice", twice, due, missed)
         yield from self._lengths(requests, opening, begun)
 
     def _lengths(self, requests: "_Requests", opening: Places, begun: int) -> Iterator[RecordedFigure]:
@@ -229,18 +241,18 @@ class RequestLog:
         if not is_in.any():
             return
         cycle = requests.cycle[is_in] - begun
-        ends_us, own_us = np.full(len(opening), -np.inf), np.zeros(len(opening))
-        np.maximum.at(ends_us, cycle, self.times_us[requests.end[is_in]])
+        ends, own_us = np.full(len(opening), -1), np.zeros(len(opening))
+        np.maximum.at(ends, cycle, requests.end[is_in])
         for places in (requests.last[is_in], requests.end[is_in]):
             np.add.at(own_us, cycle, self.wire_us[places])
-        lasts_us = ends_us - self.starts_us[requests.first[opening]]
-        is_whole = np.isfinite(lasts_us)
-        worst = quantile(lasts_us[is_whole], self.share)
+        is_whole = ends >= 0
+        lasts_us = (self.times_us[ends] - self.starts_us[requests.first[opening]])[is_whole]
+        worst = quantile(lasts_us, self.share)
         waits_us = [doubt.us for doubt in self.cycle.doubts()]
         # The host's time before the first request is not on the wire.
         planned_us = self.cycle.required_us - self.network.nonperiodic_us - self.host_us
         doubt_us = expanded(*waits_us, worst.uncertainty or 0.0)
-        yield RecordedFigure(
+        figure = RecordedFigure(
             "last answer after the first request",
             "us",
             planned_us if np.isfinite(planned_us) else None,
@@ -250,8 +262,9 @@ class RequestLog:
             int(is_whole.sum()),
             "cycle.period_us",
         )
+        yield self._located(figure, ends[is_whole], lasts_us)
         if all(len(node.requests) == len(node.answers) == 1 for node in self.nodes):
-            share = float(np.median(own_us[is_whole] / lasts_us[is_whole]))
+            share = float(np.median(own_us[is_whole] / lasts_us))
             terms = self.cycle.by_term
             wire_us = terms["cycle_command_us"] + terms["cycle_feedback_us"]
             yield RecordedFigure(
@@ -280,12 +293,9 @@ class RequestLog:
             worst = quantile(found.least_us, self.share)
             doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
             key, count = node.group.key("execution"), len(found.least_us)
-            quantity, planned_us = f"{node.label}: request to answer", node.planned_us
-            figures.append(
-                RecordedFigure(quantity, "us", planned_us, worst.value, doubt_us, "at most", count, key)._replace(
-                    note=_median(found.least_us[found.is_exact])
-                )
-            )
+            quantity, note = f"{node.name}: request to answer", _median(found.least_us, found.is_exact)
+            figure = RecordedFigure(quantity, "us", node.planned_us, worst.value, doubt_us, "at most", count, key, note)
+            figures.append(self._located(figure, found.begin, found.least_us))
         if not figures:
             return
         furthest = max(figures, key=lambda figure: figure.residual or 0.0)
@@ -301,7 +311,7 @@ class RequestLog:
         least_us, is_exact = (
             np.concatenate([getattr(one, name) for one in found]) for name in ("least_us", "is_exact")
         )
-        if np.count_nonzero(is_exact) < LEAST_EVENTS:
+        if np.count_nonzero(is_exact) < max(LEAST_EVENTS, _MOST * len(is_exact)):
             return
         median_us = round(float(np.median(least_us[is_exact])), 1)
         worst_us = quantile(least_us, self.share).value
@@ -331,11 +341,11 @@ class RequestLog:
         worst = quantile(gaps_us, self.share)
         doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
         behind = "request" if self.traffic.access == "burst" else "answer"
-        note = f"behind the {behind} before, without waits for other frames; {_median(gaps_us[is_exact])}"
+        note = f"behind the {behind} before, without waits for other frames; {_median(gaps_us, is_exact)}"
         figure = RecordedFigure(
             quantity, "us", self.host_us, worst.value, doubt_us, "at most", len(first), "bus.host_us", note
         )
-        yield figure
+        yield self._located(figure, first, gaps_us)
         if self.traffic.access == "polled" and len(first) >= LEAST_EVENTS:
             self.edits |= {
                 "bus.host_us": ceil(10 * worst.value) / 10,
@@ -344,9 +354,9 @@ class RequestLog:
             }
 
 
-def _median(us: Floats) -> str:
-    """Words on the median of times that no other frame hides."""
-    return f"median {np.median(us):.1f} us" if len(us) else "other frames may hide it"
+def _median(us: Floats, is_exact: npt.NDArray[np.bool_]) -> str:
+    """Words on the median of times, most of which no other frame may hide."""
+    return f"median {np.median(us[is_exact]):.1f} us" if is_exact.mean() >= _MOST else "other frames may hide it"
 
 
 class _Requests(NamedTuple):

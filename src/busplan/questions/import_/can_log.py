@@ -118,7 +118,7 @@ def _timings(messages: Sequence[can_timing.SentFrames], stretch: can_timing.Cloc
     have grown by more frames than that has.
     """
     longest_us = [_longest_us(sent) for sent in messages]
-    most = MOST_OF_FULLEST * can_timing.fullest_load(*_wire_us(messages, longest_us))
+    most = MOST_OF_FULLEST * float(can_timing.second_loads(*_wire_us(messages, longest_us)).max())
     window_us, share = can_timing.WINDOW_US, 1.0
     rows = [sent.periods is not None for sent in messages]
     before: list[_Timing] = []
@@ -178,7 +178,7 @@ def _fullest(messages: Sequence[can_timing.SentFrames], stretch: can_timing.Cloc
 
     def load(bit_rate_kbit_s: float, data_bit_rate_kbit_s: float = USUAL_DATA_BIT_RATE) -> float:
         us = [_longest_us(sent, bit_rate_kbit_s, data_bit_rate_kbit_s) for sent in messages]
-        return can_timing.fullest_load(*_wire_us(messages, us))
+        return float(can_timing.second_loads(*_wire_us(messages, us)).max())
 
     seconds = np.unique((stretch.times_us - stretch.times_us[0]) // can_timing.WINDOW_US)
     return MostLoad(load, len(seconds), int(seconds[-1]) + 1)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from busplan.buses.can.equations import BASE_BITS, USUAL_DATA_BIT_RATE, bit_us
 from busplan.buses.can.logged import wire_times
+from busplan.buses.can.recorded_cycles import emergencies
 from busplan.buses.rule import day_of
 from busplan.english import plural
 from busplan.errors import BusplanError
@@ -205,7 +206,9 @@ class _Log:
 
     def _at(self, index: int) -> _Moment:
         """Time and number of a frame by its index in the log."""
-        return _Moment(_rounded(self.frames.times_us[index]) / 1e6, int(self.frames.numbers[index]))
+        return _Moment(
+            _rounded(self.frames.times_us[index] + self.frames.lead_us) / 1e6, int(self.frames.numbers[index])
+        )
 
     def _load(self, wire_us: Floats) -> float | None:
         """Share of the time; the first frame ended with its stamp."""
@@ -256,7 +259,7 @@ class _Log:
         at_us = float(self.frames.errors_us[place])
         # A text of candump may give error frames no time.
         is_known = -can_timing.WINDOW_US <= at_us <= float(self.frames.times_us.max()) + can_timing.WINDOW_US
-        return at_us / 1e6 if is_known else None, int(self.frames.error_numbers[place])
+        return _rounded(at_us + self.frames.lead_us) / 1e6 if is_known else None, int(self.frames.error_numbers[place])
 
     def _identifiers(self) -> list[RecordedIdentifier]:
         all_us = float(self.wire_us.sum())
@@ -265,7 +268,7 @@ class _Log:
         wire_us[self.stretch.taken] = self.wire_us
         found = []
         for sent in self.messages.values():
-            own_us = float(wire_us[sent.taken].sum())
+            own_us = float(wire_us[sent.frames].sum())
             role = canopen.role(sent) if self.canopen else None
             found.append(
                 RecordedIdentifier(
@@ -274,14 +277,14 @@ class _Log:
                     "CAN" if not sent.is_fd else "CAN FD" if sent.switches else "CAN FD without a switch",
                     role and role.name,
                     role and role.node,
-                    len(sent.taken),
+                    len(sent.frames),
                     *self._gaps(sent),
-                    int(self.frames.sizes[sent.taken].min()),
+                    int(self.frames.sizes[sent.frames].min()),
                     sent.most_bytes,
                     own_us / self.stretch.length_us if self.rate and self.stretch.length_us else None,
                     own_us / all_us if is_shared and all_us else None,
-                    *self._at(int(sent.taken[0])),
-                    *self._at(int(sent.taken[-1])),
+                    *self._at(int(sent.frames[0])),
+                    *self._at(int(sent.frames[-1])),
                 )
             )
         return found
@@ -301,14 +304,28 @@ class _Log:
             _rounded(np.median(gaps_us)),
             _rounded(gaps_us.min()),
             _rounded(gaps_us[widest]),
-            *self._at(int(sent.taken[widest + 1])),
+            *self._at(int(sent.frames[widest + 1])),
         )
 
     def _emergencies(self) -> list[RecordedEmergency]:
         if not self.canopen:
             return []
-        found = canopen.emergencies(self.frames, self.stretch)
-        return [RecordedEmergency(*one[:4], *self._at(one.first), *self._at(one.last)) for one in found]
+        found = emergencies(self.frames, self.stretch.taken)
+        keys = found.nodes << 24 | found.codes << 8 | found.registers
+        _, first, counts = np.unique(keys, return_index=True, return_counts=True)
+        last = len(keys) - 1 - np.unique(keys[::-1], return_index=True)[1]
+        rows = sorted(zip(first.tolist(), last.tolist(), counts.tolist(), strict=True))
+        return [
+            RecordedEmergency(
+                int(found.nodes[one]),
+                int(found.codes[one]),
+                int(found.registers[one]),
+                count,
+                *self._at(int(found.frames[one])),
+                *self._at(int(found.frames[end])),
+            )
+            for one, end, count in rows
+        ]
 
     def _remarks(self) -> list[str]:
         frames = self.frames
