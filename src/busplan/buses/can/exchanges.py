@@ -90,7 +90,10 @@ class RequestLog:
         """Largest error of a time from the end of one frame to the start of another [us]."""
         rates = {"bit_rate_kbit_s": self.traffic.bit_rate_kbit_s}
         rates["data_bit_rate_kbit_s"] = self.traffic.data_bit_rate_kbit_s
-        self.wire_us = wire_times(frames, stretch.taken, **rates).us
+        self.wire_us, worst_us, none_us = wire_times(frames, stretch.taken, **rates)
+        # The stuff bits of CAN FD are not known.
+        unknown_us = (worst_us - none_us)[frames.is_fd[stretch.taken]] / 2
+        self.error_us += float(unknown_us.max(initial=0.0))
         self.starts_us = self.times_us - self.wire_us
         bits = np.where(frames.extended[stretch.taken], 29, BASE_BITS)
         pairs = zip(frames.identifiers[stretch.taken].tolist(), bits.tolist(), strict=True)
@@ -226,8 +229,8 @@ class RequestLog:
         opened = np.zeros(len(cycles), dtype=np.int64)
         opened[periods.places] = requests.first[opening]
         due, missing, twice = 0, list[Places](), list[Places]()
-        for node, found in zip(self.nodes, self.found, strict=True):
-            sent = due_pdos(grid_us, self.times_us[found.last], every=int(node.group.every), is_sent=is_sent)
+        for found in self.found:
+            sent = due_pdos(grid_us, self.times_us[found.last], every=1, is_sent=is_sent)
             due += sent.due
             missing.append(opened[sent.missing])
             twice.append(found.last[sent.twice])
