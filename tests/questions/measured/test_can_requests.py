@@ -15,7 +15,7 @@ from tests.oracles.can_requests import Arm
 from tests.registers import at_least
 
 WAYS = ("polled", "burst")
-SEEDS = range(at_least(8))
+SEEDS = range(at_least(4))
 
 
 def plan_text(random: Random, access: str, period_us: float) -> str:
@@ -103,6 +103,7 @@ def frame_of(found: Compared, sort: str, number: int, cycle: int, *, place: int 
     return frames[place]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("access", WAYS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_machine_that_keeps_its_plan_is_within_it_and_its_times_are_the_true_ones(
@@ -138,6 +139,7 @@ def test_a_machine_that_keeps_its_plan_is_within_it_and_its_times_are_the_true_o
             assert host.recorded >= 0.8 * max(machine.hosts.values()) - host.uncertainty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("access", WAYS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_each_fault_is_found_at_its_frame(seed: int, access: str, tmp_path: Path) -> None:
@@ -176,6 +178,7 @@ def test_each_fault_is_found_at_its_frame(seed: int, access: str, tmp_path: Path
     assert skipped.figures["cycles without requests"].recorded == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_was_measured_makes_a_plan_that_holds(seed: int, tmp_path: Path) -> None:
     path, plan = subject(seed, "polled", tmp_path)

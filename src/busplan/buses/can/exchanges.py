@@ -332,10 +332,17 @@ class RequestLog:
             self.edits |= {f"{member.node_key('execution')}.{key}": value for key, value in values.items()}
 
     def _host(self, requests: "_Requests") -> Iterator[RecordedFigure]:
-        """The host's time to its next request: behind the answer before, of requests at once behind the one before."""
-        floors = (requests.last if self.traffic.access == "burst" else requests.end)[:-1]
-        is_next = (requests.cycle[1:] == requests.cycle[:-1]) & (floors >= 0) & (floors < requests.first[1:])
-        floors, first = floors[is_next], requests.first[1:][is_next]
+        """The host's time to its next request: behind the answer before, of requests at once behind the one before.
+
+        Of these the host has queued all frames of one before the next, whatever the order in which they go.
+        """
+        order = np.arange(len(requests.node))
+        if self.traffic.access == "burst":
+            order = np.lexsort((requests.node, requests.cycle))
+        node, cycle, first = requests.node[order], requests.cycle[order], requests.first[order]
+        floors = (first if self.traffic.access == "burst" else requests.end)[:-1]
+        is_next = (cycle[1:] == cycle[:-1]) & (node[1:] == node[:-1] + 1) & (floors >= 0) & (floors < first[1:])
+        floors, first = floors[is_next], first[1:][is_next]
         quantity = "next request of the host"
         if not len(first):
             return
