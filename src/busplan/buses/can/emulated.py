@@ -242,12 +242,16 @@ class _Machine:
         coming, waiting = list(self._alone()), list[tuple[int, int, _Sender, int]]()
         heapify(coming)
         errors = sorted(self.hit[ERRORS])
-        now_us = 0.0
-        while coming or waiting:
-            now_us = now_us if waiting else max(now_us, coming[0][0])
+        now_us, free = 0.0, ""
+        while coming or waiting or free:
+            now_us = now_us if waiting or free else max(now_us, coming[0][0])
             while coming and coming[0][0] <= now_us:
                 _, running, sender, number = heappop(coming)
                 self._offer(waiting, (sender.order, running, sender, number))
+            if free:
+                self._next_of(waiting, free)
+                free = ""
+                continue
             _, running, sender, number = heappop(waiting)
             is_counter = sender.stream.name == SYNC
             frame, wire_us = (
@@ -258,8 +262,8 @@ class _Machine:
                 del errors[0]
                 frame, wire_us = _ERROR, wire_us / 2 + (c.ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
                 heappush(waiting, (sender.order, running, sender, number))
-            elif sender.queue:
-                self._next_of(waiting, sender.queue)
+            else:
+                free = sender.queue
             now_us += wire_us
             if now_us >= self.end_us:
                 return

@@ -26,6 +26,8 @@ _SPACE_BITS: Final = 3
 """Bits between two frames (ISO 11898-1), which a stamp at the end of a frame may leave out."""
 _MOST: Final = 0.5
 """Share of the times of a node that no other frame may hide, at least, so that they show its execution time [1]."""
+_MOST_OF_CYCLE: Final = 0.9
+"""Time without a request in a cycle of requests at once, at most, as a share of the period [1]."""
 _NOTHING: Final[Places] = np.zeros(0, dtype=np.int64)
 
 
@@ -193,13 +195,13 @@ class RequestLog:
         )
         order = np.argsort(last, kind="stable")
         node, first, last, end = node[order], first[order], last[order], end[order]
-        apart_us = np.diff(self.times_us[last])
+        apart_us, ahead = np.diff(self.times_us[last]), np.diff(node)
         period_us = self.traffic.period_us
         if self.traffic.access == "burst":
             terms = self.cycle.by_term
-            begins = apart_us > (period_us - terms["cycle_host_us"] - terms["cycle_command_us"]) / 2
+            pause_us = (period_us - terms["cycle_host_us"] - terms["cycle_command_us"]) / 2
+            begins = ((ahead <= 0) & (apart_us > pause_us)) | (apart_us > _MOST_OF_CYCLE * period_us)
         else:
-            ahead = np.diff(node)
             begins = (ahead < 0) | ((ahead == 0) & (apart_us > period_us / 2))
         return _Requests(node, first, last, end, np.concatenate(([0], np.cumsum(begins))))
 
