@@ -154,8 +154,11 @@ def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path:
     logged += [Logged(50.0, 0x181, b"", True, 0)]
     answer = of_log(candump(sorted(logged)), tmp_path)
     unseen = figure(answer, "frames of the plan never in the log")
-    assert (unseen.hidden, unseen.verdict) == ("never in the log: 1 of feedback, sdo-request, heartbeats", "not shown")
-    assert figure(answer, "PDOs missing").note == "299 of 0x183"
+    assert (unseen.hidden, unseen.verdict) == (
+        "never in the log: feedback of node 3 (0x183), sdo-request, heartbeats",
+        "not shown",
+    )
+    assert figure(answer, "PDOs missing").note == "299 of feedback of node 3 (0x183)"
     unplanned = figure(answer, "frames of no message")
     # 0x181 of 29 bits is not the feedback of 11.
     assert (unplanned.recorded, unplanned.note, unplanned.verdict) == (21, "0x181, 0x7fe, 0x7ff", "outside")
@@ -179,7 +182,7 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     assert figure(of_log(candump(arbitrated(late)), tmp_path), "last PDO").verdict == "not shown"
     plan = busplan.load_profile(PLAN, changes={"node.execution.grade": "measured"})
     answer = of_log(candump(arbitrated(late)), tmp_path, plan=plan)
-    assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC"]
+    assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC", "command: response"]
 
 
 def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from busplan.buses.can.streams import Stream, place, streams
 from busplan.buses.can.traffic import SYNC, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 from busplan.recordings.can import written_bits
 from busplan.recordings.written import candump
 
@@ -69,7 +69,7 @@ class _Machine:
             raise BusplanError(f'a log with SYNC is emulated, and bus.access = "{self.traffic.access}" has none')
         self.end_us = emulation.cycles * self.period_us
         if not self.traffic.has_cycle and (others := emulation.faults.keys() - {ERRORS.name}):
-            raise BusplanError(f"fault {min(others)}: a network of messages alone has no SYNC and no PDOs")
+            raise ArgumentError(f"fault {min(others)}: a network of messages alone has no SYNC and no PDOs")
         sent, unstuffed = streams(self.traffic), streams(replace(self.traffic, is_stuffed=False))
         emulation.require_few(sum(stream.identifiers * self.end_us / stream.period_us for stream in sent))
         self.senders = [sender for pair in zip(sent, unstuffed, strict=True) for sender in self._senders(*pair)]
