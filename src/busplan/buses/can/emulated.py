@@ -12,7 +12,7 @@ from busplan.buses.can.streams import Stream, place, streams
 from busplan.buses.can.traffic import HOST, NODE, NOT_BY_PRIORITY, SYNC, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Group, Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError
 from busplan.recordings.can import written_bits
 from busplan.recordings.written import candump
 
@@ -125,7 +125,7 @@ class _Machine:
             none, known = f'bus.access = "{bus.access}" has no SYNC', _OF_REQUESTS
         others = [name for name in self.emulation.faults if name not in {fault.name for fault in (*known, ERRORS)}]
         if others:
-            raise BusplanError(f"fault {min(others)}: {none}")
+            raise ArgumentError(f"fault {min(others)}: {none}")
 
     def _senders(self, stream: Stream, unstuffed: Stream) -> Iterator[_Sender]:
         """Senders of a stream, which is also given without stuff bits: one an identifier, with random data."""
@@ -304,7 +304,7 @@ class _Requests(_Machine):
     def _place(self, fault: Fault) -> int:
         """Number of the node that a fault hits: the second one, where there are several."""
         if fault is SLOW_HOST and fault.name in self.emulation.faults and len(self.nodes) == 1:
-            raise BusplanError(f"fault {fault.name}: there is one node, and no next request in its cycle")
+            raise ArgumentError(f"fault {fault.name}: there is one node, and no next request in its cycle")
         return min(1, len(self.nodes) - 1)
 
     def _is_hit(self, fault: Fault, number: int, cycle: int) -> bool:
