@@ -201,6 +201,7 @@ class RequestLog:
             terms = self.cycle.by_term
             pause_us = (period_us - terms["cycle_host_us"] - terms["cycle_command_us"]) / 2
             begins = ((ahead <= 0) & (apart_us > pause_us)) | (apart_us > _MOST_OF_CYCLE * period_us)
+            begins[_repeats(node, self.times_us[last], begins, least_us=period_us / 2)] = True
         else:
             begins = (ahead < 0) | ((ahead == 0) & (apart_us > period_us / 2))
         return _Requests(node, first, last, end, np.concatenate(([0], np.cumsum(begins))))
@@ -364,6 +365,23 @@ class RequestLog:
                 "bus.host_grade": "measured",
                 "bus.host_uncertainty_us": round(doubt_us / 2, 2),
             }
+
+
+def _repeats(nodes: Places, times_us: Floats, begins: npt.NDArray[np.bool_], *, least_us: float) -> Places:
+    """Requests but the first that come again in a cycle, some of which begin where known, after some time or more.
+
+    A cycle begins there, too; a node that gets its request again sooner gets it twice.
+    """
+    seen_us, repeats = {int(nodes[0]): float(times_us[0])}, list[int]()
+    rows = zip(nodes[1:].tolist(), times_us[1:].tolist(), begins.tolist(), strict=True)
+    for number, (node, us, begin) in enumerate(rows):
+        is_again = not begin and us - seen_us.get(node, us) > least_us
+        if is_again:
+            repeats.append(number)
+        if begin or is_again:
+            seen_us.clear()
+        seen_us.setdefault(node, us)
+    return np.array(repeats, dtype=np.int64)
 
 
 def _median(us: Floats, is_exact: npt.NDArray[np.bool_]) -> str:
