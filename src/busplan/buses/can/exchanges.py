@@ -298,7 +298,7 @@ class RequestLog:
                 continue
             worst = quantile(found.least_us, self.share)
             doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
-            key, count = node.group.key("execution"), len(found.least_us)
+            key, count = node.group.key("execution.worst_extra_us"), len(found.least_us)
             quantity, note = f"{node.name}: request to answer", _median(found.least_us, found.is_exact)
             figure = RecordedFigure(quantity, "us", node.planned_us, worst.value, doubt_us, "at most", count, key, note)
             figures.append(self._located(figure, found.begin, found.least_us))
@@ -321,16 +321,16 @@ class RequestLog:
             return
         median_us = round(float(np.median(least_us[is_exact])), 1)
         worst_us = quantile(least_us, self.share).value
-        values = {
+        values: dict[str, Any] = {
             "kind": "linear",
             "base_us": median_us,
             "per_byte_us": 0.0,
-            "payload_bytes": None,
-            "time_us": None,
             "grade": "measured",
             "uncertainty_us": round(self.error_us / 2, 2),
             "worst_extra_us": max(ceil(10 * (worst_us - median_us)) / 10, 0.0),
         }
+        if group.node.execution.kind == "table":
+            values |= {"payload_bytes": None, "time_us": None}
         for member in group.members:
             self.edits |= {f"{member.node_key('execution')}.{key}": value for key, value in values.items()}
 
