@@ -63,7 +63,8 @@ class Arm:
         return number < len(self.nodes) and cycle not in self.skipped
 
     def _host(self, number: int, cycle: int) -> float:
-        us = self.random.uniform(0.2, 1) * self.plan["bus"].get("host_us", 0.0) + self.late.get((number, cycle), 0.0)
+        most_us: float = self.plan["bus"].get("host_us", 0.0)
+        us = self.random.uniform(0.2, 1) * most_us + self.late.get((number, cycle), 0.0)
         self.hosts[number, cycle] = us
         return us
 

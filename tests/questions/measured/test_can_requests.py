@@ -212,13 +212,12 @@ def test_an_echo_that_takes_789_us_is_mostly_wire(tmp_path: Path) -> None:
         (answer,) = arbitrated([Queued(0, 0x200, random.randbytes(8))], bit_us=2)
         sent += [request, answer._replace(us=cycle * 10_000 + 789)]
     (tmp_path / "echo.log").write_text(candump(sent))
-    figures = {
-        figure.quantity: figure for figure in busplan.measured(tmp_path / "echo.toml", tmp_path / "echo.log").figures
-    }
-    assert figures["last answer after the first request"].recorded == pytest.approx(789, abs=10)
-    assert 0.56 <= figures["wire of that time"].recorded <= 0.68
+    answer_of = busplan.measured(tmp_path / "echo.toml", tmp_path / "echo.log")
+    recorded: dict[str, Any] = {figure.quantity: figure.recorded for figure in answer_of.figures}
+    assert recorded["last answer after the first request"] == pytest.approx(789, abs=10)
+    assert 0.56 <= recorded["wire of that time"] <= 0.68
     frames_us = sum(frame.wire_us for frame in sent) / 100
-    assert figures["request to answer"].recorded == pytest.approx(789 - frames_us, abs=40)
+    assert recorded["request to answer"] == pytest.approx(789 - frames_us, abs=40)
     # 500 kbit/s takes twice as long for each bit: what is not wire would stay at 1 Mbit/s.
     assert 789 - frames_us / 2 == pytest.approx(541, abs=20)
 
