@@ -197,15 +197,17 @@ def test_what_was_measured_makes_a_plan_that_holds(seed: int, tmp_path: Path) ->
     assert first["base_us"] - 5 <= base_us <= first["base_us"] + first["worst_extra_us"] + 5
 
 
+ECHO = (
+    'schema_version = 1\nname = "echo"\n[bus]\nkind = "can"\nbit_rate_kbit_s = 500\nnodes = 1\naccess = "polled"\n'
+    "[cycle]\nperiod_us = 10000\n[payload]\nread_bytes = 8\nwrite_bytes = 8\ncommand_identifier = 0x100\n"
+    "feedback_identifier = 0x200\n[node]\naxes = 1\n"
+    '[node.execution]\nkind = "linear"\nbase_us = 300\nper_byte_us = 0\n'
+)
+
+
 def test_an_echo_that_takes_789_us_is_mostly_wire(tmp_path: Path) -> None:
     """8 bytes, 11 bits, 500 kbit/s, there and back in 789 us (Zahhask45/Team04_DrivaPi): 56 to 68 % is wire."""
-    text = (
-        'schema_version = 1\nname = "echo"\n[bus]\nkind = "can"\nbit_rate_kbit_s = 500\nnodes = 1\naccess = "polled"\n'
-        "[cycle]\nperiod_us = 10000\n[payload]\nread_bytes = 8\nwrite_bytes = 8\ncommand_identifier = 0x100\n"
-        "feedback_identifier = 0x200\n[node]\naxes = 1\n"
-        '[node.execution]\nkind = "linear"\nbase_us = 300\nper_byte_us = 0\n'
-    )
-    (tmp_path / "echo.toml").write_text(text)
+    (tmp_path / "echo.toml").write_text(ECHO)
     random, sent = Random(1), list[Logged]()
     for cycle in range(100):
         (request,) = arbitrated([Queued(cycle * 10_000, 0x100, random.randbytes(8))], bit_us=2)
@@ -220,6 +222,21 @@ def test_an_echo_that_takes_789_us_is_mostly_wire(tmp_path: Path) -> None:
     assert recorded["request to answer"] == pytest.approx(789 - frames_us, abs=40)
     # 500 kbit/s takes twice as long for each bit: what is not wire would stay at 1 Mbit/s.
     assert 789 - frames_us / 2 == pytest.approx(541, abs=20)
+
+
+def test_frames_of_others_hide_a_part_of_an_answer(tmp_path: Path) -> None:
+    """Three that go first come 400 us behind the request, and the answer behind them: it took 400 us or more."""
+    (tmp_path / "echo.toml").write_text(ECHO)
+    queued = []
+    for start_us in range(0, 1_000_000, 10_000):
+        others = [Queued(start_us + 700, 0x50 + number, bytes(8)) for number in range(3)]
+        queued += [Queued(start_us, 0x100, bytes(8)), *others, Queued(start_us + 800, 0x200, bytes(8))]
+    logged = arbitrated(queued, bit_us=2)
+    (tmp_path / "echo.log").write_text(candump(logged))
+    answer = busplan.measured(tmp_path / "echo.toml", tmp_path / "echo.log")
+    (figure,) = (figure for figure in answer.figures if figure.quantity == "request to answer")
+    assert figure.recorded == pytest.approx(700 - logged[0].us, abs=10)
+    assert answer.edits == {}
 
 
 def test_the_gate_names_the_slow_node(tmp_path: Path) -> None:

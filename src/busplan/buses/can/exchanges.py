@@ -97,9 +97,8 @@ class RequestLog:
         unknown_us = (worst_us - none_us)[frames.is_fd[stretch.taken]] / 2
         self.error_us += float(unknown_us.max(initial=0.0))
         self.starts_us = self.times_us - self.wire_us
-        bits = np.where(frames.extended[stretch.taken], 29, BASE_BITS)
-        pairs = zip(frames.identifiers[stretch.taken].tolist(), bits.tolist(), strict=True)
-        self.order = np.array([place(*pair) for pair in pairs], dtype=np.int64)
+        identifiers, is_extended = frames.identifiers[stretch.taken], frames.extended[stretch.taken]
+        self.order = np.where(is_extended, place(identifiers, 29), place(identifiers, BASE_BITS))
         self._position = np.zeros(len(frames.times_us), dtype=np.int64)
         self._position[stretch.taken] = np.arange(len(stretch.taken))
         self._by_identifier = by_identifier
