@@ -166,10 +166,10 @@ class RequestLog:
 
     def figures(self, missed: Callable[..., RecordedFigure]) -> Iterator[RecordedFigure]:
         """Figures beside the plan; `missed` makes that of a number that counts against `limits.missed_cycles`."""
-        requests = self._requests()
-        if len(requests.last) < LEAST_EVENTS:
+        if sum(len(found.last) for found in self.found) < LEAST_EVENTS:
             yield missed("answers missing", None, 0, hidden=f"fewer than {LEAST_EVENTS} requests")
             return
+        requests = self._requests()
         yield from self._cycles(requests, missed)
         due = sum(found.due for found in self.found)
         for name in ("missing", "twice"):
