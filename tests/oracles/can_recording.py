@@ -378,6 +378,8 @@ def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
             if stream in periods_us:
                 found[f"{stream} sooner"] = max(found[f"{stream} sooner"], _sooner_us(frames, periods_us[stream]))
             elif stream != "SYNC":
+                of_syncs_us = [frame.us - syncs[number] for frame in frames if (number := frame.queued.number) in syncs]
+                found[f"{stream} response"] = max(found[f"{stream} response"], *of_syncs_us, 0.0)
                 # What the last SYNC asked for may come when the log has ended.
                 due = sorted(number for number in syncs if (number - first.number) % every == 0)[:-1]
                 found["PDOs missing"] += len(set(due) - numbers)
