@@ -307,7 +307,9 @@ class _Host:
         elif stream in self.feedback:
             self.missing[cycle] -= 1
             if not self.missing[cycle] and not bus.get("pipeline_cycles", 0):
-                yield from self.commands(frame.us + self.random.uniform(0.5, 1) * bus.get("host_us", 0.0), cycle)
+                adapter_us = bus.get("host_read_us", 0.0) + bus.get("host_write_us", 0.0)
+                host_us = self.random.uniform(0.5, 1) * bus.get("host_us", 0.0)
+                yield from self.commands(frame.us + host_us + adapter_us, cycle)
 
     def commands(self, us: float, cycle: int) -> Iterator[Queued]:
         """The commands of a cycle."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, isfinite
+from math import ceil, inf, isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +12,7 @@ from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us
 from busplan.buses.can.exchanges import RequestLog
 from busplan.buses.can.logged import wire_times
+from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.recorded_cycles import (
     EMERGENCY,
     Ints,
@@ -26,7 +27,7 @@ from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of, latest_start
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -215,6 +216,53 @@ class _Log:
             yield self._located(figure, frames, number.astype(np.float64))
         yield from self._after_sync("last PDO after SYNC", self.pdos, self._last_us, self._doubts, _PERIOD)
 
+    def _host(self) -> Iterator[RecordedFigure]:
+        """The first command behind the last feedback: a log holds the adapter, the host and the adapter in one."""
+        commands = [pdos for pdos in self.pdos if pdos.stream.name == NAMES["write"]]
+        cycles = int(joined(pdos.cycles for pdos in self.pdos).max(initial=-1)) + 1
+        first_us, last_us, number = np.full(cycles, inf), np.full(cycles, -inf), np.zeros(cycles)
+        first = np.zeros(cycles, dtype=np.int64)
+        for pdos in self.pdos:
+            if pdos.stream.name == NAMES["write"]:
+                is_first = pdos.late_us < first_us[pdos.cycles]
+                first_us[pdos.cycles[is_first]], first[pdos.cycles[is_first]] = (
+                    pdos.late_us[is_first],
+                    pdos.frames[is_first],
+                )
+            else:
+                np.maximum.at(last_us, pdos.cycles, pdos.late_us)
+            np.add.at(number, pdos.cycles, 1)
+        is_whole = number == len(self.pdos)
+        gaps_us = (first_us - last_us)[is_whole]
+        if not (isinstance(self.cycle, PdoCycle) and self.cycle.waits_for_host and len(gaps_us)):
+            return
+        us, adapter_us = self.cycle.by_term, self.traffic.adapter_us
+        own_us = self.traffic.host_us + adapter_us
+        waits_us = us["cycle_blocking_us"] + us["cycle_interference_us"]
+        gap = quantile(gaps_us, self.share)
+        # A plan that gives none of them rests on none, and is held to its cycle alone.
+        is_planned = self.network.profile.bus.model_fields_set & {"host_us", "adapter", "host_write_us", "host_read_us"}
+        doubts_us = (doubt.us for doubt in self.cycle.doubts() if doubt.key.startswith("bus."))
+        found = RecordedFigure(
+            "first command after the last feedback",
+            "us",
+            _finite(own_us + waits_us + max(pdos.stream.frame_us for pdos in commands)),
+            gap.value,
+            self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
+            "at most" if is_planned else "shown",
+            len(gaps_us),
+            "bus.host_us",
+            "planned: bus.host_read_us, bus.host_us, bus.host_write_us, the wait for other frames and its own",
+        )
+        if found.verdict == "outside":
+            # Only their sum counts, so what the adapter's keys do not give is the host's. So is what other frames add.
+            shortest = streams(replace(self.traffic, is_stuffed=False))
+            least_us = min(stream.frame_us for stream in shortest if stream.name == NAMES["write"])
+            doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
+            self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
+            self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
+        yield self._located(found, first[is_whole], gaps_us)
+
     @property
     def _last_us(self) -> float:
         """Time that a cycle takes from SYNC on, late or not, by the plan [us]."""
@@ -378,7 +426,7 @@ class _Log:
             yield jitter._replace(note=f"planned: {of_host}the wait for other frames and stuff bits")
             if jitter.verdict == "outside":
                 # All of it may be the host's: what other frames add is not known of any one SYNC.
-                self.edits[key] = ceil(10 * late.value) / 10
+                self.edits |= latest_start(key, ceil(10 * late.value) / 10, events=count, share=self.share)
 
     def _message(
         self, stream: Stream, label: str, recorded: Sequence[can_timing.SentFrames], spread_us: float | None
