@@ -215,6 +215,7 @@ class _Log:
             figure = self._missed(f"PDOs {sort}", int(number.sum()), due, note=first_of(notes, can_timing.LISTED))
             yield self._located(figure, frames, number.astype(np.float64))
         yield from self._after_sync("last PDO after SYNC", self.pdos, self._last_us, self._doubts, _PERIOD)
+        yield from self._host()
 
     def _host(self) -> Iterator[RecordedFigure]:
         """The first command behind the last feedback: a log holds the adapter, the host and the adapter in one."""
