@@ -37,6 +37,7 @@ __all__ = [
     "PlanAnswer",
     "PolledFigures",
     "Profile",
+    "RecordedAnswer",
     "ReportAnswer",
     "Sercos2Figures",
     "Sercos3Figures",
@@ -59,6 +60,7 @@ __all__ = [
     "map_",
     "measured",
     "plan",
+    "recorded",
     "report",
     "sweep",
     "timeline",
@@ -88,6 +90,7 @@ if TYPE_CHECKING:
     from busplan.questions.map import MapAnswer, map_
     from busplan.questions.measured import MeasuredAnswer, measured
     from busplan.questions.plan import PlanAnswer, plan
+    from busplan.questions.recorded import RecordedAnswer, recorded
     from busplan.questions.report import ReportAnswer, report
     from busplan.questions.sweep import SweepAnswer, sweep
     from busplan.questions.timeline import TimelineAnswer, timeline

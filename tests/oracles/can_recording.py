@@ -335,13 +335,18 @@ def simulated(machine: Machine) -> list[Logged]:
 
 def recorded(machine: Machine) -> tuple[bytes, dict[str, float]]:
     """A machine's log, which begins and ends anywhere in a cycle, and the truth of it."""
+    logged, stamped, start_s = in_log(machine)
+    return candump(stamped, start_s=start_s, step_us=machine.step_us).encode(), truth(machine, logged)
+
+
+def in_log(machine: Machine) -> tuple[list[Logged], list[Logged], float]:
+    """Frames of a machine's log, the same with the stamps of its recorder, and the time at which they begin [s]."""
     random = Random(-machine.seed)
     start_us = (1 + random.random()) * machine.period_us
     end_us = start_us + machine.cycles * machine.period_us
     logged = [frame for frame in simulated(machine) if start_us <= frame.us < end_us]
     stamped = list(_handed_over(logged, machine.latency_us, random)) if machine.latency_us else logged
-    start_s = 1_700_000_000 + random.random()
-    return candump(stamped, start_s=start_s, step_us=machine.step_us).encode(), truth(machine, logged)
+    return logged, stamped, 1_700_000_000 + random.random()
 
 
 def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
@@ -375,6 +380,8 @@ def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
             if stream in periods_us:
                 found[f"{stream} sooner"] = max(found[f"{stream} sooner"], _sooner_us(frames, periods_us[stream]))
             elif stream != "SYNC":
+                of_syncs_us = [frame.us - syncs[number] for frame in frames if (number := frame.queued.number) in syncs]
+                found[f"{stream} response"] = max(found[f"{stream} response"], *of_syncs_us, 0.0)
                 # What the last SYNC asked for may come when the log has ended.
                 due = sorted(number for number in syncs if (number - first.number) % every == 0)[:-1]
                 found["PDOs missing"] += len(set(due) - numbers)

@@ -18,14 +18,16 @@ class DuePdos(NamedTuple):
 
     cycles: npt.NDArray[np.int64]
     """Number of the SYNC at which each PDO was due."""
+    pdos: npt.NDArray[np.int64]
+    """Index of each PDO; those before the first SYNC at which one is due are left out."""
     late_us: Floats
     """Time of each PDO after this SYNC [us]."""
     due: int
     """PDOs that were due."""
-    missing: int
-    """PDOs that never came."""
-    twice: int
-    """PDOs that came again for one SYNC."""
+    missing: npt.NDArray[np.int64]
+    """Number of the SYNC of each PDO that never came."""
+    twice: npt.NDArray[np.int64]
+    """Index of each PDO that came again for one SYNC."""
 
 
 def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDArray[np.bool_] | None = None) -> DuePdos:
@@ -41,19 +43,21 @@ def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDAr
     --------
     The second of five is late, so that it comes with the third; the fifth SYNC is the last, and nobody knows of it:
 
-    >>> due_pdos(np.arange(5) * 100.0, np.array([30.0, 210, 230, 330]), every=1)[1:]
-    (array([ 30., 110.,  30.,  30.]), 4, 0, 0)
+    >>> found = due_pdos(np.arange(5) * 100.0, np.array([30.0, 210, 230, 330]), every=1)
+    >>> found.late_us.tolist(), found.due, found.missing.tolist(), found.twice.tolist()
+    ([30.0, 110.0, 30.0, 30.0], 4, [], [])
     """
     sent = np.ones(len(sync_us), dtype=np.bool_) if is_sent is None else is_sent
     due = _due_at(sync_us, times_us, every, sent)
     cycles = np.searchsorted(sync_us[due], times_us, side="right") - 1
-    times_us, cycles = times_us[cycles >= 0], cycles[cycles >= 0]
+    pdos = np.flatnonzero(cycles >= 0)
+    times_us, cycles = times_us[pdos], cycles[pdos]
     # After the last SYNC the log may end.
     whole = len(due) - 1
     counts = np.bincount(cycles, minlength=len(due))[:whole]
     first = np.searchsorted(cycles, np.arange(len(due) + 1))
     missing: list[int] = []
-    twice = 0
+    twice: list[int] = []
     for place in np.flatnonzero(counts != 1).tolist():
         if not counts[place]:
             missing += [place] if sent[due[place]] else []
@@ -61,14 +65,19 @@ def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDAr
         for number in range(int(counts[place]) - 1):
             if not missing or place - missing[-1] > _MADE_UP:
                 # The log may begin with a PDO of a SYNC before it.
-                twice += int(counts[place]) - 1 - number if place else 0
+                twice += range(first[place] + number + 1, first[place + 1]) if place else ()
                 break
             cycles[first[missing.pop() + 1] : first[place + 1] - 1 - number] -= 1
-    return DuePdos(due[cycles], times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum()), len(missing), twice)
+    late_us, of_due = times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum())
+    return DuePdos(due[cycles], pdos, late_us, of_due, due[_places(missing)], pdos[_places(twice)])
+
+
+def _places(places: list[int]) -> npt.NDArray[np.int64]:
+    return np.array(places, dtype=np.int64)
 
 
 def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """Numbers of the SYNCs at which a PDO of every n-th is due: where most of some neighbours come.
+    """Numbers of the SYNCs at which a PDO of every n-th is due: behind which some neighbours are the least late.
 
     Nodes count the SYNCs that they get, a host counts periods: of both the one is taken by which more PDOs are due.
     """
@@ -76,12 +85,17 @@ def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[
     if every == 1:
         return periods
     comes = np.bincount(np.searchsorted(sync_us, times_us, side="right"), minlength=len(sync_us) + 1)[1:] > 0
-    ways = (_most_common(comes, count % every, every) for count in (periods, is_sent.cumsum()))
+    ways = (_least_late(comes, count % every, every) for count in (periods, is_sent.cumsum()))
     return max(ways, key=lambda due: int(np.count_nonzero(comes[due])))
 
 
-def _most_common(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
-    """Numbers of the SYNCs whose rest is the most common one of their block among those after which a PDO comes."""
+def _least_late(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
+    """Numbers of the SYNCs whose rest is that of their block behind which PDOs are the fewest SYNCs late in all."""
     blocks = np.array_split(np.arange(len(rest)), max(len(rest) // (_BLOCK * every), 1))
-    most = [int(np.bincount(rest[block[comes[block]]], minlength=every).argmax()) for block in blocks]
-    return np.concatenate([block[rest[block] == common] for block, common in zip(blocks, most, strict=True)])
+    due = []
+    for block in blocks:
+        often = np.bincount(rest[block[comes[block]]], minlength=every)
+        # For the next rest those of this one are late by all but a round, and all others by one less.
+        late = np.cumsum(every * often - often.sum())
+        due.append(block[rest[block] == (int(np.argmin(late)) + 1) % every])
+    return np.concatenate(due)
