@@ -24,11 +24,14 @@ from busplan.recordings.statistics import Floats
 from busplan.recordings.written import SYNTHETIC
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
-_ROW: Final = Struct("<dIQBB")
+_ROW: Final = Struct("<dIQBBI")
 _ROW_FIELDS: Final = np.dtype(
-    [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
+    [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1"), ("number", "<u4")]
 )
 """Data type of a frame while a log is read."""
+_ERROR_ROW: Final = Struct("<dI")
+_ERROR_FIELDS: Final = np.dtype([("stamp_s", "<f8"), ("number", "<u4")])
+"""Data type of an error frame while a log is read."""
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader"}
 """Readers of python-can by the first bytes of a file. Any other text is read as candump's."""
 _FORMATS: Final = "text of candump, Vector's ASC and BLF, PEAK's TRC, captures of SocketCAN"
@@ -40,6 +43,7 @@ _LINE: Final = re.compile(
 """Line of `candump -l`, or of candump's output on a terminal."""
 _CLASSICAL_SIZE: Final = 1
 """Digits of a classical frame's size on a terminal; an FD frame has two."""
+_STAMP: Final = re.compile(r"\([ \t]*([^\s)]+)\)")
 _ERROR_FRAME: Final = "20000080"
 """Identifier of an error frame in `candump -l`."""
 _PACKET: Final = Struct(">IBB2x")
@@ -97,13 +101,26 @@ class CanFrames(NamedTuple):
     """Whether the frame is one of CAN FD."""
     switched: npt.NDArray[np.bool_]
     """Whether its data are at the data bit rate (BRS)."""
+    numbers: npt.NDArray[np.int64]
+    """Number of each frame in the file, from 1; error frames and those of other channels count."""
+    data: npt.NDArray[np.uint64]
+    """The first 8 bytes of the data, the first one in the highest bits."""
     remote: int
-    errors: int
-    """Number of error frames, which are not among the n. Remote frames are."""
+    errors_us: Floats
+    """Stamps of the error frames, which are not among the n (remote frames are), after the first frame [us]."""
+    error_numbers: npt.NDArray[np.int64]
+    """Numbers of the error frames in the file, from 1."""
     broken: str
     """Reason why the log ends early; empty for a whole one."""
     synthetic: str = ""
     """Words of the log on its emulation; empty without them."""
+    dropped: int | None = None
+    """Frames that the recorder reports as dropped; None where the format does not count them."""
+
+    @property
+    def errors(self) -> int:
+        """Number of error frames."""
+        return len(self.errors_us)
 
 
 def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> CanFrames:
@@ -188,7 +205,8 @@ class _CandumpText(_Lines):
         match = _LINE.fullmatch(line)
         if match is None:
             if "ERRORFRAME" in line:
-                return f"(0.0) can {_ERROR_FRAME}#"
+                stamp = _STAMP.match(line)
+                return f"({stamp[1] if stamp else 0.0}) can {_ERROR_FRAME}#"
             if not self._has_begun:
                 raise BusplanError(f"{self._path}: is not a CAN log in a known format: {_FORMATS}")
             raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
@@ -244,6 +262,7 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_Captured
         if len(notes.interfaces) > 1:
             raise BusplanError(f"{path}: has frames of {len(notes.interfaces)} interfaces; export those of one bus")
     log.synthetic = notes.synthetic
+    log.dropped = notes.dropped if notes.interfaces else None
     if notes.broken_at is not None:
         log.broken = f"damaged at byte {notes.broken_at:,}"
 
@@ -294,7 +313,8 @@ class _Log:
         self._channel = channel
         self._rows = bytearray()
         self._channels: Counter[object] = Counter()
-        self._errors = 0
+        self._errors = bytearray()
+        self.dropped: int | None = None
         self.broken = self.synthetic = ""
 
     def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
@@ -305,16 +325,16 @@ class _Log:
             if not number % _REPORT_EVERY:
                 with suppress(OSError, ValueError):
                     report()
+            if max(len(self._rows) // _ROW.size, len(self._errors) // _ERROR_ROW.size) >= _MOST_FRAMES:
+                raise _DamageError(f"it has more than {_MOST_FRAMES:,} frames; give a part of it")
             if message.is_error_frame:
-                self._errors += 1
+                self._errors += _ERROR_ROW.pack(message.timestamp, number)
                 continue
             _require_frame(message, last_s)
             last_s = message.timestamp
             self._channels[message.channel] += 1
             if len(self._channels) > _MOST_CHANNELS:
                 raise _DamageError(f"over {_MOST_CHANNELS} channels")
-            if len(self._rows) >= _MOST_FRAMES * _ROW.size:
-                raise _DamageError(f"it has more than {_MOST_FRAMES:,} frames; give a part of it")
             if self._channel not in (None, str(message.channel)):
                 continue
             is_fd = message.is_fd
@@ -327,13 +347,15 @@ class _Log:
                 int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"),
                 message.dlc,
                 message.is_extended_id * _EXTENDED | is_remote * _REMOTE | is_fd * _FD | is_switched * _SWITCHED,
+                number,
             )
 
     def frames(self, path: Path) -> CanFrames:
         """All frames as arrays."""
         if not self._rows:
             why = f" ({self.broken})" if self.broken else ""
-            errors = f" but {plural(self._errors, 'error frame')}" if self._errors else ""
+            number = len(self._errors) // _ERROR_ROW.size
+            errors = f" but {plural(number, 'error frame')}" if number else ""
             if self._channel is not None and self._channels:
                 names = first_of([*map(_shown, self._channels)], _SHOWN_CHANNELS)
                 raise BusplanError(f"{path}: channel {_shown(self._channel)}: no such channel; there are {names}")
@@ -346,7 +368,7 @@ class _Log:
             raise BusplanError(
                 f"{path}: has frames of {len(self._channels)} channels: {named}; --channel NAME reads one"
             )
-        rows = np.frombuffer(self._rows, dtype=_ROW_FIELDS)
+        rows, errors = np.frombuffer(self._rows, _ROW_FIELDS), np.frombuffer(self._errors, _ERROR_FIELDS)
         stamps, flags = rows["stamp_s"], rows["flags"]
         identifiers, sizes = rows["identifier"].astype(np.int64), rows["dlc"].astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
@@ -360,10 +382,14 @@ class _Log:
             np.where(fd, 0, written_bits(identifiers, extended, remote, codes, rows["data"])),
             fd,
             switched,
+            rows["number"].astype(np.int64),
+            rows["data"],
             int(np.count_nonzero(remote)),
-            self._errors,
+            (errors["stamp_s"] - stamps[0]) * 1e6,
+            errors["number"].astype(np.int64),
             self.broken,
             self.synthetic or f"{SYNTHETIC} by the name of its channel" * (SYNTHETIC in self._channels),
+            self.dropped,
         )
 
 
