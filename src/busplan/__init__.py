@@ -37,6 +37,7 @@ __all__ = [
     "PlanAnswer",
     "PolledFigures",
     "Profile",
+    "RecordedTimelineAnswer",
     "ReportAnswer",
     "Sercos2Figures",
     "Sercos3Figures",
@@ -90,7 +91,7 @@ if TYPE_CHECKING:
     from busplan.questions.plan import PlanAnswer, plan
     from busplan.questions.report import ReportAnswer, report
     from busplan.questions.sweep import SweepAnswer, sweep
-    from busplan.questions.timeline import TimelineAnswer, timeline
+    from busplan.questions.timeline import RecordedTimelineAnswer, TimelineAnswer, timeline
     from busplan.sections.profile import Profile
 else:
     # Loaded at first use, because the command line imports this package, too. Type checkers do not see this, so that
@@ -110,6 +111,7 @@ else:
         "CheckAnswer": "busplan.gate.check",
         "import_profile": "busplan.questions.import_",
         "ImportAnswer": "busplan.questions.import_",
+        "RecordedTimelineAnswer": "busplan.questions.timeline",
     }
     """Module of each name that the rule below does not find."""
 

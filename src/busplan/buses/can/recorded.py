@@ -40,7 +40,7 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     """
     frames = read_can(path, channel=channel, progress=progress)
     try:
-        log = _Log(network, frames, share)
+        log = Log(network, frames, share)
     except BusplanError as error:
         raise BusplanError(f"{path}: {error}") from None
     day = day_of(int(frames.start_s * 1e9))
@@ -48,7 +48,7 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     return compared.unless_synthetic(frames.synthetic)
 
 
-class _Log:
+class Log:
     """A log beside the plan."""
 
     def __init__(self, network: Network, frames: CanFrames, share: float) -> None:
@@ -131,7 +131,7 @@ class _Log:
         most = self.network.profile.limits.missed_cycles
         return _limited(quantity, most, number, events, "limits.missed_cycles", note=note, hidden=hidden)
 
-    def _wire_us(self, *, is_stuffed: bool) -> Floats:
+    def wire_us(self, *, is_stuffed: bool) -> Floats:
         """Time of each frame on the wire with the most stuff bits, or with none [us]."""
         taken = self.taken
         us = np.zeros(len(taken))
@@ -158,7 +158,7 @@ class _Log:
         is_whole = self.has_switch or not self.frames.switched[self.taken].any()
         if count < 2 or span_us <= 0 or (is_fd.all() and not is_whole):  # noqa: PLR2004 - a distance
             return
-        worst_us, none_us = self._wire_us(is_stuffed=True), self._wire_us(is_stuffed=False)
+        worst_us, none_us = self.wire_us(is_stuffed=True), self.wire_us(is_stuffed=False)
         # Of CAN FD the stuff bits are not known: any number of the possible ones.
         wire_us = np.where(is_fd, (worst_us + none_us) / 2, self.frames.bits[self.taken] * self.bit_us)
         # The first frame ended with its stamp.

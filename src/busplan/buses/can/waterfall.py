@@ -1,0 +1,319 @@
+"""A cycle of a CAN log as events: its frames, those of others between them, and the waits for nodes and host."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.buses.can.due import due_pdos
+from busplan.buses.can.equations import BASE_BITS
+from busplan.buses.can.recorded import Log
+from busplan.buses.can.streams import Stream, streams
+from busplan.buses.can.traffic import NAMES, SYNC, answer_us
+from busplan.buses.network import Network, numbers_by_due
+from busplan.buses.waterfall import (
+    Awaited,
+    RecordedCycles,
+    Waterfall,
+    WaterfallEvent,
+    from_zero,
+    node_names,
+    planned_events,
+)
+from busplan.english import first_of
+from busplan.errors import BusplanError
+from busplan.progress import Progress
+from busplan.recordings import can_timing
+from busplan.recordings.can import read_can
+from busplan.recordings.statistics import Floats, periodic_events
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Ints = npt.NDArray[np.int64]
+_FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
+_OTHERS: Final = ("blocking", "message", "repeated")
+"""Kinds of planned events that are of other traffic."""
+_FRAMES: Final = ("sync", "feedback_frame", "command_frame")
+"""Kinds of planned events that are frames of the cycle."""
+_STAMP_US: Final = 1.0
+"""Delay of stamps that is no more than the rounding of logs in microseconds."""
+_ROUNDING_US: Final = 1e-6
+"""Shortest wait that is no rounding of a float."""
+
+
+class _Sender(NamedTuple):
+    """What sends the frames of an identifier."""
+
+    role: str
+    """SYNC, feedback or command; the name of a message, or empty for none of the plan."""
+    label: str
+    node: str = ""
+    ready_us: float = 0.0
+    """Planned time of the node from its SYNC or request to the feedback [us]."""
+    frame_us: float = 0.0
+    """Planned time of the frame [us]."""
+    every: int = 1
+
+
+def recorded_cycles(network: Network, path: "Path", *, channel: str | None, progress: Progress) -> RecordedCycles:
+    """The whole cycles of a CAN log; BusplanError for one without."""
+    frames = read_can(path, channel=channel, progress=progress)
+    try:
+        return _CanCycles(network, Log(network, frames, share=1.0))
+    except BusplanError as error:
+        raise BusplanError(f"{path}: {error}") from None
+
+
+class _CanCycles(RecordedCycles):
+    """Cycles from SYNC to SYNC, or from one first request to the next."""
+
+    def __init__(self, network: Network, log: Log) -> None:
+        self.network, self.log, self.synthetic = network, log, log.frames.synthetic
+        rate = log.traffic.bit_rate_kbit_s
+        if log.least_bit_rate.surely > rate:
+            needed = f"its frames need {log.least_bit_rate.surely:,.0f} kbit/s"
+            raise BusplanError(f"{needed}, and bus.bit_rate_kbit_s = {rate:g}: they do not fit on the wire of the plan")
+        longest_us, shortest_us = (log.wire_us(is_stuffed=is_stuffed) for is_stuffed in (True, False))
+        is_fd = log.frames.is_fd[log.taken]
+        # Of CAN FD the stuff bits are not known.
+        self.wire_us = np.where(is_fd, (longest_us + shortest_us) / 2, log.frames.bits[log.taken] * log.bit_us)
+        self.wire_doubt_us = np.where(is_fd, (longest_us - shortest_us) / 2, 0.0)
+        # A frame ends before the next one begins: a stamp beyond that is late.
+        sent_us = self.wire_us.cumsum()
+        self.ends_us: Floats = np.minimum.accumulate((log.times_us - sent_us)[::-1])[::-1] + sent_us
+        self.key = log.frames.identifiers[log.taken] * 2 + log.frames.extended[log.taken]
+        self.senders = dict(self._senders())
+        self.places = {key: np.flatnonzero(self.key == key) for key in self.senders}
+        self.anchor = self._anchor()
+        self.cycle_of, self.cycles = self._aligned()
+        frames = np.flatnonzero(self.cycle_of >= 0)
+        self.first, self.last = (np.zeros(int(self.cycle_of.max()) + 1, dtype=np.int64) for _ in range(2))
+        self.first[self.cycle_of[self.places[self.anchor]]] = self.places[self.anchor]
+        np.maximum.at(self.last, self.cycle_of[frames], frames)
+        self.numbers = (self.cycles + 1).tolist()
+        first, last = self.first[self.cycles], self.last[self.cycles]
+        self.lengths_us = (self.ends_us[last] - self.ends_us[first] + self.wire_us[first]).tolist()
+
+    def _senders(self) -> Iterator[tuple[int, _Sender]]:
+        """Senders by key of their identifier: of all PDOs of the plan, and of all frames of the log."""
+        sent = streams(self.log.traffic)
+        keys = self.key
+        for stream in sent:
+            if not stream.is_message:
+                cyclic = np.arange(int(stream.first), int(stream.last) + 1) * 2 + (stream.identifier_bits > BASE_BITS)
+                keys = np.union1d(keys, cyclic)
+        for key in np.unique(keys).tolist():
+            identifier, is_extended = divmod(key, 2)
+            of_plan = (
+                stream
+                for stream in sent
+                if (stream.identifier_bits > BASE_BITS) == is_extended and stream.first <= identifier <= stream.last
+            )
+            stream = next(of_plan, None)
+            unplanned = _Sender("", f"{identifier:#x}, no message of the plan")
+            yield key, unplanned if stream is None else self._of_stream(stream, identifier)
+
+    def _of_stream(self, stream: Stream, identifier: int) -> _Sender:
+        if stream.is_message or stream.name == SYNC:
+            kind = "message " if stream.is_message else ""
+            return _Sender(stream.name, f"{kind}{stream.name} {identifier:#x}", frame_us=float(stream.frame_us))
+        group = next(group for group in self.network.groups if group.name == stream.group)
+        number = (identifier - int(stream.first)) // max(round(stream.identifiers / group.nodes), 1)
+        names = [
+            f"{member.name or 'node'} {own}" for member in group.members for own in range(1, int(member.nodes) + 1)
+        ]
+        node, traffic = names[min(number, len(names) - 1)], self.log.traffic
+        ready_us = group.read_execution_us + group.worst_extra_us
+        if not traffic.has_sync:
+            ready_us = answer_us([group], access="burst")
+        label, every = f"{stream.name} {identifier:#x} of {node}", round(stream.period_us / traffic.period_us)
+        return _Sender(stream.name, label, node, float(ready_us), float(stream.frame_us), max(every, 1))
+
+    def _anchor(self) -> int:
+        """Key of the identifier that begins a cycle: SYNC, or of the most frequent requests that behind the most rest."""
+        role = SYNC if self.log.traffic.has_sync else _COMMAND
+        keys = [key for key, sender in self.senders.items() if sender.role == role and len(self.places[key]) > 1]
+        if not keys:
+            what = "SYNC" if role == SYNC else "request of any node"
+            raise BusplanError(f"it has no whole cycle: no {what} comes twice")
+        often = min(self.senders[key].every for key in keys)
+        cyclic = np.isin(self.key, [key for key in self.senders if self.senders[key].role in (_FEEDBACK, _COMMAND)])
+        # Without the first frame, before which nothing is recorded.
+        ends_us = np.where(cyclic, self.ends_us, -np.inf)
+        before_us = np.concatenate(([-np.inf], np.maximum.accumulate(ends_us)[:-1]))
+        rest_us = self.ends_us - self.wire_us - before_us
+        return max(
+            (key for key in keys if self.senders[key].every == often),
+            key=lambda key: float(np.median(rest_us[self.places[key]][1:])),
+        )
+
+    def _aligned(self) -> tuple[Ints, Ints]:
+        """Cycle of each frame, -1 for one that is of none, and the cycles that are whole."""
+        begins = self.places[self.anchor]
+        begin_us = self.log.times_us[begins]
+        periods = periodic_events(begin_us)
+        at = np.arange(len(begins)) if periods is None else periods.places
+        numbers = np.arange(int(at[-1]) + 1)
+        sync_us, is_sent = np.interp(numbers, at, begin_us), np.isin(numbers, at)
+        cycle_of = np.full(len(self.key), -1)
+        for key, sender in self.senders.items():
+            if sender.role in (_FEEDBACK, _COMMAND) and key != self.anchor:
+                places = self.places[key]
+                due = due_pdos(sync_us, self.log.times_us[places], every=sender.every, is_sent=is_sent)
+                cycle_of[places[len(places) - len(due.cycles) :]] = due.cycles
+        cycle_of[begins] = at
+        # The log may end within the last one.
+        return cycle_of, at[:-1]
+
+    def waterfall(self, place: int) -> Waterfall:
+        """Events of a cycle."""
+        cycle, log = int(self.cycles[place]), self.log
+        first, last = int(self.first[cycle]), int(self.last[cycle])
+        start_us = float(self.ends_us[first] - self.wire_us[first])
+        events = tuple(
+            event._replace(start_us=event.start_us - start_us, end_us=event.end_us - start_us)
+            for event in self._events(cycle, first, last)
+        )
+        return Waterfall(
+            self.numbers[place],
+            (start_us - float(log.times_us[0])) / 1e6,
+            self._number(first),
+            events,
+            self._planned(cycle),
+            self._doubts_us(events, float(self.wire_doubt_us[first : last + 1].sum())),
+            tuple(self._remarks(cycle)),
+        )
+
+    def _number(self, place: int) -> int:
+        """Number of a frame in the log."""
+        return int(self.log.frames.numbers[self.log.taken[place]])
+
+    def _events(self, cycle: int, first: int, last: int) -> Iterator[WaterfallEvent]:
+        """Frames and waits of a cycle, at the times of the log [us]."""
+        waits, seen = _Waits(self, cycle, first), set[int]()
+        pieces: list[tuple[float, float]] = []
+        held: list[WaterfallEvent] = []
+        now_us = float(self.ends_us[first] - self.wire_us[first])
+        for place in range(first, last + 1):
+            key, number = int(self.key[place]), self._number(place)
+            sender, end_us = self.senders[key], float(self.ends_us[place])
+            begin_us = max(end_us - float(self.wire_us[place]), now_us)
+            if begin_us > now_us + _ROUNDING_US:
+                pieces.append((now_us, begin_us))
+            else:
+                begin_us = now_us
+            if self.cycle_of[place] != cycle:
+                is_pdo = sender.role in (SYNC, _FEEDBACK, _COMMAND)
+                label = f"{sender.label}, of another cycle" if is_pdo else sender.label
+                held.append(WaterfallEvent("others", label, begin_us, end_us, sender.node, number, end_us - begin_us))
+            else:
+                yield from sorted((*held, *waits.ended(place, sender, pieces)), key=lambda event: event.start_us)
+                late_us, label = end_us - begin_us, f"{sender.label}, again"
+                if key not in seen:
+                    late_us, label = max(late_us - sender.frame_us, 0.0), sender.label
+                seen.add(key)
+                yield WaterfallEvent("wire", label, begin_us, end_us, sender.node, number, late_us)
+                held, pieces = [], []
+            now_us = end_us
+
+    def missing(self, cycle: int, role: str) -> list[int]:
+        """Keys of the feedback or of the commands that are due in a cycle and never come."""
+        found = []
+        for key, sender in self.senders.items():
+            if sender.role == role:
+                cycles = self.cycle_of[self.places[key]]
+                cycles = cycles[cycles >= 0]
+                rests = np.bincount(cycles % sender.every, minlength=sender.every)
+                is_known = sender.every == 1 or len(cycles)
+                if is_known and rests.argmax() == cycle % sender.every and cycle not in cycles:
+                    found.append(key)
+        return found
+
+    def _doubts_us(self, events: Sequence[WaterfallEvent], stuffing_us: float) -> dict[Awaited, float]:
+        """Largest error of each sum: frames are exact, and every stretch of one sort of wait lies between two stamps."""
+        doubts_us: dict[Awaited, float] = {"wire": stuffing_us, "others": stuffing_us}
+        waited = [event.waits_for for event in events if event.waits_for not in doubts_us]
+        for awaited, _ in groupby(waited):
+            doubts_us[awaited] = doubts_us.get(awaited, stuffing_us) + self.log.stamp_error_us
+        return doubts_us
+
+    def _planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
+        """The planned cycle with the groups that are seen, from its first frame to its last one."""
+        rates, here = self.log.cycle.rates, np.flatnonzero(self.cycle_of == cycle).tolist()
+        nodes = {self.senders[int(self.key[place])].node for place in here}
+        names, ends = node_names(self.network), np.cumsum([int(group.nodes) for group in self.network.groups])
+        is_seen = [not nodes.isdisjoint(part) for part in (names[a:b] for a, b in zip((0, *ends), ends, strict=False))]
+        numbers = {due: found[0] for due, found in numbers_by_due(rates).items()}
+        due = min(numbers, key=lambda due: sum(a != b for a, b in zip(due, is_seen, strict=True)))
+        planned = self.log.cycle.at(numbers[due]) if len(numbers) > 1 else self.log.cycle
+        events = [*planned_events(planned.events(), planned.term_figures, others=_OTHERS, names=names)]
+        frames = [place for place, (kind, _) in enumerate(events) if kind in _FRAMES]
+        return from_zero(event for _, event in events[frames[0] : frames[-1] + 1]) if frames else ()
+
+    def _remarks(self, cycle: int) -> Iterator[str]:
+        missing = [self.senders[key].label for role in (_FEEDBACK, _COMMAND) for key in self.missing(cycle, role)]
+        if missing:
+            yield f"Never came in this cycle: {first_of(missing, can_timing.LISTED)}."
+        log = self.log
+        yield (
+            f"Frames have their length at {log.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these have an "
+            f"error of up to {log.stamp_error_us:g} us."
+        )
+        if log.stamp_error_us > log.step_us + _STAMP_US:
+            yield "Frames come closer than the bus allows: stamps are late."
+        yield (
+            "From the first frame to the last: of the plan SYNC's jitter, the frame that SYNC waits for, and what comes "
+            "behind the last frame are left out."
+            if log.traffic.has_sync
+            else "From the first request to the last answer: the host's time before the first request is left out."
+        )
+
+
+class _Waits:
+    """Waits of a cycle while its frames are gone through."""
+
+    def __init__(self, cycles: _CanCycles, cycle: int, first: int) -> None:
+        self.cycles, self.has_sync = cycles, cycles.log.traffic.has_sync
+        self.is_burst, bus = cycles.log.traffic.access == "burst", cycles.network.profile.bus
+        self.host_us = float(bus.host_us)
+        self.waits_for_all = self.has_sync and not bus.pipeline_cycles
+        self.left = {place for place in np.flatnonzero(cycles.cycle_of == cycle).tolist()}
+        self.missing = {cycles.senders[key].node for key in cycles.missing(cycle, _FEEDBACK)}
+        self.asked_us: dict[str, float] = {}
+        """End of the request to each node."""
+        self.sync_us = self.last_us = float(cycles.ends_us[first])
+        self.last: _Sender | None = None
+
+    def ended(self, place: int, sender: _Sender, pieces: Sequence[tuple[float, float]]) -> Iterator[WaterfallEvent]:
+        """The pieces of a wait that a frame of the cycle ends."""
+        awaited, ready_us = self._awaited(sender)
+        for begin_us, end_us in pieces:
+            late_us = max(end_us - max(begin_us, ready_us), 0.0)
+            number = self.cycles._number(place)
+            yield WaterfallEvent(awaited, sender.label, begin_us, end_us, sender.node, number, late_us)
+        self.left.discard(place)
+        self.last, self.last_us = sender, float(self.cycles.ends_us[place])
+        if sender.role == _COMMAND:
+            self.asked_us[sender.node] = self.last_us
+
+    def _awaited(self, sender: _Sender) -> tuple[Awaited, float]:
+        """What the cycle has waited for, and until when the plan waits for it [us]."""
+        if sender.role == _FEEDBACK:
+            asked_us = self.sync_us if self.has_sync else self.asked_us.get(sender.node, self.last_us)
+            return "nodes", asked_us + sender.ready_us
+        is_first = self.last is None or self.last.role != _COMMAND
+        if self.waits_for_all and is_first and self._lacks_feedback():
+            return "unknown", self.last_us
+        if not (self.has_sync or self.is_burst) and self.last is not None and self.last.role == _COMMAND:
+            # The node that was asked has not answered.
+            return ("unknown" if self.last.node != sender.node else "host"), self.last_us
+        is_next = self.last is not None and self.last.node != sender.node
+        return "host", self.last_us + self.host_us * (is_first or (not self.has_sync and is_next))
+
+    def _lacks_feedback(self) -> bool:
+        """Whether feedback is to come, or never comes."""
+        roles = (self.cycles.senders[int(self.cycles.key[place])].role for place in self.left)
+        return bool(self.missing) or _FEEDBACK in roles
