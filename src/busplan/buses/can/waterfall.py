@@ -81,9 +81,10 @@ class _CanCycles(RecordedCycles):
         # Of CAN FD the stuff bits are not known.
         self.wire_us = np.where(is_fd, (longest_us + shortest_us) / 2, log.frames.bits[log.taken] * log.bit_us)
         self.wire_doubt_us = np.where(is_fd, (longest_us - shortest_us) / 2, 0.0)
-        # A frame ends before the next one begins: a stamp beyond that is late.
+        # A frame ends before the next one begins: a stamp beyond that is late. Of the time since 1970 a float holds
+        # whole microseconds.
         sent_us = self.wire_us.cumsum()
-        self.ends_us: Floats = np.minimum.accumulate((log.times_us - sent_us)[::-1])[::-1] + sent_us
+        self.ends_us: Floats = np.minimum.accumulate((np.rint(log.times_us) - sent_us)[::-1])[::-1] + sent_us
         self.key = log.frames.identifiers[log.taken] * 2 + log.frames.extended[log.taken]
         self.senders = dict(self._senders())
         self.places = {key: np.flatnonzero(self.key == key) for key in self.senders}
@@ -133,7 +134,7 @@ class _CanCycles(RecordedCycles):
         return _Sender(stream.name, label, node, float(ready_us), float(stream.frame_us), max(every, 1))
 
     def _anchor(self) -> int:
-        """Key of the identifier that begins a cycle: SYNC, or of the most frequent requests that behind the most rest."""
+        """Key of the identifier that begins a cycle: SYNC, or of the most frequent requests that behind a pause."""
         role = SYNC if self.log.traffic.has_sync else _COMMAND
         keys = [key for key, sender in self.senders.items() if sender.role == role and len(self.places[key]) > 1]
         if not keys:
@@ -180,14 +181,14 @@ class _CanCycles(RecordedCycles):
         return Waterfall(
             self.numbers[place],
             (start_us - float(log.times_us[0])) / 1e6,
-            self._number(first),
+            self.number_of(first),
             events,
             self._planned(cycle),
             self._doubts_us(events, float(self.wire_doubt_us[first : last + 1].sum())),
             tuple(self._remarks(cycle)),
         )
 
-    def _number(self, place: int) -> int:
+    def number_of(self, place: int) -> int:
         """Number of a frame in the log."""
         return int(self.log.frames.numbers[self.log.taken[place]])
 
@@ -198,11 +199,14 @@ class _CanCycles(RecordedCycles):
         held: list[WaterfallEvent] = []
         now_us = float(self.ends_us[first] - self.wire_us[first])
         for place in range(first, last + 1):
-            key, number = int(self.key[place]), self._number(place)
+            key, number = int(self.key[place]), self.number_of(place)
             sender, end_us = self.senders[key], float(self.ends_us[place])
             begin_us = max(end_us - float(self.wire_us[place]), now_us)
             if begin_us > now_us + _ROUNDING_US:
-                pieces.append((now_us, begin_us))
+                destroyed = self._destroyed(now_us, begin_us)
+                held += destroyed
+                waits_us = destroyed[-1].end_us if destroyed else now_us
+                pieces += [(waits_us, begin_us)] if waits_us < begin_us else []
             else:
                 begin_us = now_us
             if self.cycle_of[place] != cycle:
@@ -219,6 +223,16 @@ class _CanCycles(RecordedCycles):
                 held, pieces = [], []
             now_us = end_us
 
+    def _destroyed(self, from_us: float, to_us: float) -> list[WaterfallEvent]:
+        """Time between two frames up to the last error frame there: how much of it is on the wire is not known."""
+        frames = self.log.frames
+        errors_us = np.rint(frames.errors_us)
+        inside = np.flatnonzero((errors_us > from_us) & (errors_us <= to_us + self.log.stamp_error_us))
+        if not len(inside):
+            return []
+        number, end_us = int(frames.error_numbers[inside[-1]]), min(float(errors_us[inside[-1]]), to_us)
+        return [WaterfallEvent("unknown", "an error frame, and what it destroyed", from_us, end_us, "", number)]
+
     def missing(self, cycle: int, role: str) -> list[int]:
         """Keys of the feedback or of the commands that are due in a cycle and never come."""
         found = []
@@ -233,7 +247,7 @@ class _CanCycles(RecordedCycles):
         return found
 
     def _doubts_us(self, events: Sequence[WaterfallEvent], stuffing_us: float) -> dict[Awaited, float]:
-        """Largest error of each sum: frames are exact, and every stretch of one sort of wait lies between two stamps."""
+        """Largest error of each sum: lengths are exact, and waits of one sort in a row lie between two stamps."""
         doubts_us: dict[Awaited, float] = {"wire": stuffing_us, "others": stuffing_us}
         waited = [event.waits_for for event in events if event.waits_for not in doubts_us]
         for awaited, _ in groupby(waited):
@@ -259,14 +273,14 @@ class _CanCycles(RecordedCycles):
             yield f"Never came in this cycle: {first_of(missing, can_timing.LISTED)}."
         log = self.log
         yield (
-            f"Frames have their length at {log.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these have an "
-            f"error of up to {log.stamp_error_us:g} us."
+            f"Frames have their length at {log.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these have "
+            f"an error of up to {log.stamp_error_us:g} us."
         )
         if log.stamp_error_us > log.step_us + _STAMP_US:
             yield "Frames come closer than the bus allows: stamps are late."
         yield (
-            "From the first frame to the last: of the plan SYNC's jitter, the frame that SYNC waits for, and what comes "
-            "behind the last frame are left out."
+            "From the first frame to the last: of the plan SYNC's jitter, the frame that SYNC waits for, and what "
+            "comes behind the last frame are left out."
             if log.traffic.has_sync
             else "From the first request to the last answer: the host's time before the first request is left out."
         )
@@ -280,7 +294,8 @@ class _Waits:
         self.is_burst, bus = cycles.log.traffic.access == "burst", cycles.network.profile.bus
         self.host_us = float(bus.host_us)
         self.waits_for_all = self.has_sync and not bus.pipeline_cycles
-        self.left = {place for place in np.flatnonzero(cycles.cycle_of == cycle).tolist()}
+        self.left = set(np.flatnonzero(cycles.cycle_of == cycle).tolist())
+        """Places of frames that are to come."""
         self.missing = {cycles.senders[key].node for key in cycles.missing(cycle, _FEEDBACK)}
         self.asked_us: dict[str, float] = {}
         """End of the request to each node."""
@@ -292,7 +307,7 @@ class _Waits:
         awaited, ready_us = self._awaited(sender)
         for begin_us, end_us in pieces:
             late_us = max(end_us - max(begin_us, ready_us), 0.0)
-            number = self.cycles._number(place)
+            number = self.cycles.number_of(place)
             yield WaterfallEvent(awaited, sender.label, begin_us, end_us, sender.node, number, late_us)
         self.left.discard(place)
         self.last, self.last_us = sender, float(self.cycles.ends_us[place])

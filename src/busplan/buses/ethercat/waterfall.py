@@ -80,7 +80,7 @@ class _EthercatCycles(RecordedCycles):
         """Events of a cycle."""
         sent = self._sent(place)
         start_us = sent[0].start_us
-        events = from_zero(self._events(place, sent))
+        events = from_zero(self._events(sent))
         lost = [frame.number for frame in sent if frame.back_us is None]
         runs = 1 + sum(frame.end_us < after.start_us for frame, after in pairwise(sent))
         stamps_us = self.seen.stamp_us * runs
@@ -111,7 +111,7 @@ class _EthercatCycles(RecordedCycles):
             sent.append(_Sent(self._number(frame), start_us, end_us, back_us, self._number(back)))
         return sent
 
-    def _events(self, place: int, sent: list[_Sent]) -> Iterator[WaterfallEvent]:
+    def _events(self, sent: list[_Sent]) -> Iterator[WaterfallEvent]:
         """Frames one behind the other, and what is waited for between them and at their end [us]."""
         last_us = max(frame.back_us or 0.0 for frame in sent)
         for index, frame in enumerate(sent):

@@ -11,6 +11,8 @@ from busplan.sections.profile import Profile
 
 WORST: Final = "worst"
 MEDIAN: Final = "median"
+_ROUNDING: Final = 1e-9
+"""Relative rounding error of a time."""
 Chosen = Literal["worst", "median"]
 
 
@@ -32,14 +34,22 @@ class Share(NamedTuple):
         """Recorded time less planned time [us]."""
         return self.recorded_us - self.planned_us
 
+    @property
+    def excess_us(self) -> float:
+        """Time by which it is longer than planned; 0 where that may be error [us]."""
+        more_us = self.difference_us
+        return more_us if more_us > self.uncertainty_us + _ROUNDING * self.recorded_us else 0.0
+
 
 class Difference(NamedTuple):
-    """The share that takes longer than planned by most, or is shorter by least where none is longer."""
+    """The share that is longer than planned by most, or, where none is, the one that differs by most."""
 
     waits_for: Awaited
     recorded_us: float
     planned_us: float
     uncertainty_us: float
+    is_longer: bool
+    """Whether it is longer than planned by more than its error."""
     cause: str
     """The frame that is latest in it; empty where none is late."""
     node: str
@@ -148,18 +158,28 @@ def _class(event: WaterfallEvent) -> Awaited:
 
 
 def _difference(shown: Waterfall, shares: tuple[Share, ...]) -> Difference:
-    share = max(shares, key=lambda share: share.difference_us)
+    longest = max(shares, key=lambda share: share.excess_us)
+    share = longest if longest.excess_us else max(shares, key=lambda share: abs(share.difference_us))
+    found = Difference(
+        share.waits_for,
+        share.recorded_us,
+        share.planned_us,
+        share.uncertainty_us,
+        is_longer=share.excess_us > 0,
+        cause="",
+        node="",
+        late_us=0.0,
+        frame=None,
+        at_s=None,
+    )
     late_us: dict[int | None, float] = {}
     last: dict[int | None, WaterfallEvent] = {}
     for event in shown.events:
         if _class(event) == share.waits_for:
             late_us[event.frame] = late_us.get(event.frame, 0.0) + event.late_us
             last[event.frame] = event
-    found = Difference(
-        share.waits_for, share.recorded_us, share.planned_us, share.uncertainty_us, "", "", 0.0, None, None
-    )
     frame = max(late_us, key=late_us.__getitem__, default=None)
-    if frame is None or late_us[frame] <= share.uncertainty_us or share.difference_us <= share.uncertainty_us:
+    if not found.is_longer or frame is None or late_us[frame] <= share.uncertainty_us:
         return found
     event = last[frame]
     at_s = shown.start_s + event.end_us / 1e6

@@ -71,8 +71,8 @@ def _word(answer: RecordedTimelineAnswer, awaited: Awaited) -> str:
 def _summary(answer: RecordedTimelineAnswer) -> blocks.Sentence:
     which = {"worst": ", the longest", "median": ", the median one", None: ""}[answer.chosen]
     template = (
-        f"{{}} beside {{}}: cycle {answer.cycle:,}{which} of {answer.cycles:,} whole ones, from frame {answer.frame:,} at "
-        f"{answer.start_s:.6f} s, takes {{}}, and {{}} in the plan."
+        f"{{}} beside {{}}: cycle {answer.cycle:,}{which} of {answer.cycles:,} whole ones, from frame {answer.frame:,} "
+        f"at {answer.start_s:.6f} s, takes {{}}, and {{}} in the plan."
     )
     return blocks.sentence(
         template,
@@ -92,9 +92,7 @@ def _chart(answer: RecordedTimelineAnswer, title: str) -> blocks.Chart:
         )
     ]
     across = charts.numbers("us", 0.0, max(answer.recorded_us, answer.planned_us))
-    words = blocks.Sentence(
-        (f"Cycle {answer.cycle:,} as recorded and as planned, from its first frame to its last one",)
-    )
+    words = blocks.Sentence((f"Cycle {answer.cycle:,} as recorded and as planned, from its first frame to its last",))
     text = sentence_text(words)
     panel = charts.Panel(charts.Lanes(across, tuple(lanes)), "Recorded and planned")
     return blocks.Chart(charts.Drawing(title, (panel,), (), text, has_characters=True), words)
@@ -143,17 +141,16 @@ def _table(answer: RecordedTimelineAnswer) -> blocks.Table:
 
 def _difference(answer: RecordedTimelineAnswer) -> blocks.Sentence:
     found = answer.difference
-    excess_us = found.recorded_us - found.planned_us
-    head = f"{_word(answer, found.waits_for)}: {{}} recorded, {{}} planned"
+    head = f"The largest difference: {_word(answer, found.waits_for)}, {{}} recorded, {{}} planned"
     values = _us(found.recorded_us, "recorded_us"), _us(found.planned_us, "planned_us")
-    if excess_us <= found.uncertainty_us:
-        return blocks.sentence(f"Nothing takes longer than planned; nearest to it {head}.", *values, state="passes")
+    if not found.is_longer:
+        return blocks.sentence(f"Nothing takes longer than planned. {head}.", *values, state="passes")
     cause = ""
     if found.cause:
         verb = "takes" if found.waits_for in ("wire", "others") else "is waited for"
         beyond = "of the wire" if found.waits_for == "others" else "longer than planned"
         cause = f": {found.cause}, frame {found.frame:,} at {found.at_s:.6f} s, {verb} {found.late_us:.1f} us {beyond}"
-    return blocks.sentence(f"The largest difference: {head}{cause}.", *values, state="warns")
+    return blocks.sentence(f"{head}{cause}.", *values, state="warns")
 
 
 def _rows(answer: RecordedTimelineAnswer) -> Iterator[blocks.Record]:
