@@ -120,6 +120,14 @@ def sync_plan(seed: int) -> dict[str, Any]:
     }
 
 
+def all_due(seed: int) -> dict[str, Any]:
+    """The same with all nodes in every cycle, and no other messages."""
+    plan = sync_plan(seed) | {"message": []}
+    for group in plan["group"]:
+        group.pop("every", None)
+    return plan
+
+
 def written(folder: Path, plan: dict[str, Any]) -> Path:
     path = folder / "random.toml"
     path.write_text(tomli_w.dumps({"schema_version": 1, **plan}))
@@ -139,10 +147,7 @@ def test_shares_of_a_cycle_of_sync_are_those_of_the_machine(folder: Path, seed: 
 
 @given(SEEDS, st.booleans())
 def test_the_worst_cycle_of_a_machine_with_a_fault_names_it(folder: Path, seed: int, is_host: bool) -> None:
-    plan = sync_plan(seed)
-    plan["message"] = []
-    for group in plan["group"]:
-        group.pop("every", None)
+    plan = all_due(seed)
     machine = Machine(plan, cycles=30, seed=seed)
     hit = Random(seed).randrange(3, 25)
     machine.late = {hit: 4000.0} if is_host else {}
@@ -267,7 +272,7 @@ def test_what_the_host_waited_for_is_not_told_where_an_answer_never_came(folder:
 
 
 def test_an_error_frame_and_what_it_destroys_are_not_attributed(folder: Path) -> None:
-    machine = Machine({**sync_plan(5), "message": []}, cycles=20, seed=5)
+    machine = Machine(all_due(5), cycles=20, seed=5)
     clean = simulated(machine)
     place = next(index for index, each in enumerate(clean) if each.queued.stream == "SYNC" and each.queued.number == 9)
     machine.destroyed = frozenset({place + 1})
