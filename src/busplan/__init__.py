@@ -37,6 +37,7 @@ __all__ = [
     "PlanAnswer",
     "PolledFigures",
     "Profile",
+    "RecordedAnswer",
     "RecordedTimelineAnswer",
     "ReportAnswer",
     "Sercos2Figures",
@@ -60,6 +61,7 @@ __all__ = [
     "map_",
     "measured",
     "plan",
+    "recorded",
     "report",
     "sweep",
     "timeline",
@@ -89,6 +91,7 @@ if TYPE_CHECKING:
     from busplan.questions.map import MapAnswer, map_
     from busplan.questions.measured import MeasuredAnswer, measured
     from busplan.questions.plan import PlanAnswer, plan
+    from busplan.questions.recorded import RecordedAnswer, recorded
     from busplan.questions.report import ReportAnswer, report
     from busplan.questions.sweep import SweepAnswer, sweep
     from busplan.questions.timeline import RecordedTimelineAnswer, TimelineAnswer, timeline

@@ -45,7 +45,7 @@ def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path
         (["--set", "bus.nodes=1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
         (["--timing-model", "both"], "both"),
         (["--cycle", "0"], "cycle 0: expected a whole number from 1"),
-        (["--cycle", "first"], "--cycle first: expected a whole number; "),
+        (["--cycle", "first"], "--cycle first: expected a whole number from 1, worst or median"),
     ],
 )
 def test_what_cannot_be_done_is_said_and_leaves_nothing(

@@ -10,6 +10,7 @@ from busplan.sourced import Sourced, read_toml
 if TYPE_CHECKING:
     from busplan.buses.limits import Value
     from busplan.buses.network import Network
+    from busplan.recordings.statistics import Events
     from busplan.sections.profile import Profile
 
 
@@ -169,6 +170,15 @@ class RecordedFigure(NamedTuple):
     """Whether the value is the mean of its events and not their quantile."""
     hidden: str = ""
     """Reason why the recording cannot show a planned figure; empty where it can."""
+    first_s: float | None = None
+    """Time of the first event with the verdict of the figure, outside or not shown, from the first frame of the
+    recording [s]. None where the figure is within, or has no such event."""
+    first_frame: int | None = None
+    """Number of its frame, from 1."""
+    worst_s: float | None = None
+    """Time of the event with the extreme value, the first of equal ones [s]; None where the figure has no events."""
+    worst_frame: int | None = None
+    """Number of its frame, from 1."""
 
     @property
     def residual(self) -> float | None:
@@ -180,7 +190,20 @@ class RecordedFigure(NamedTuple):
         """Excess over the plan: the distance for "equal", else negative within; None where nothing is planned."""
         if self.residual is None or self.sense == "shown":
             return None
-        return {"equal": abs(self.residual), "at most": self.residual, "at least": -self.residual}[self.sense]
+        return self._beyond(self.residual)
+
+    def _beyond(self, residual: Any) -> Any:
+        """Excess over the plan of a number, or of an array."""
+        return {"equal": abs(residual), "at least": -residual}.get(self.sense, residual)
+
+    @property
+    def _most(self) -> float:
+        """Largest excess over the plan that is not outside."""
+        return SURE * (self.uncertainty or 0.0) + self._rounding
+
+    @property
+    def _rounding(self) -> float:
+        return _ROUNDING * abs(self.planned or 0.0)
 
     @property
     def verdict(self) -> RecordedVerdict | None:
@@ -193,10 +216,26 @@ class RecordedFigure(NamedTuple):
             return "not shown"
         if self.beyond is None:
             return None
-        doubt, rounding = self.uncertainty or 0.0, _ROUNDING * abs(self.planned or 0.0)
-        if self.beyond <= rounding + (doubt if self.is_mean or self.sense == "equal" else 0.0):
+        doubt = (self.uncertainty or 0.0) if self.is_mean or self.sense == "equal" else 0.0
+        if self.beyond <= self._rounding + doubt:
             return "within"
-        return "outside" if self.beyond > SURE * doubt + rounding else "not shown"
+        return "outside" if self.beyond > self._most else "not shown"
+
+    def located(self, events: "Events") -> "RecordedFigure":
+        """The figure with the moments of its first and its worst event.
+
+        What is counted counts from the first on, also where the plan allows some.
+        """
+        if not len(events.values):
+            return self
+        beyond = self._beyond(events.values - (self.planned or 0.0))
+        worst = events.earliest(beyond == beyond.max())
+        chosen = beyond > (self._most if self.verdict == "outside" else self._rounding)
+        if self.unit == "1" and self.sense == "at most":
+            chosen[:] = True
+        has_first = self.verdict in ("outside", "not shown") and chosen.any()
+        first = events.earliest(chosen) if has_first else (None, None)
+        return self._replace(first_s=first[0], first_frame=first[1], worst_s=worst[0], worst_frame=worst[1])
 
 
 class Recorded(NamedTuple):

@@ -312,17 +312,18 @@ def _measurements_file(argument: str) -> Iterator[Path]:
 
 @command(
     "For a machine that was recorded with another value: --apply does not write it.",
-    reads=lambda recording, **_: (Path(recording),),
+    reads=lambda recording, **_: () if recording is None else (Path(recording),),
 )
 def measured_command(
     call: Call,
     recording: Annotated[
-        str,
+        str | None,
         typer.Argument(
             help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, "
-            "BLF or TRC, or a capture of SocketCAN."
+            "BLF or TRC, or a capture of SocketCAN.  [default: none; a CAN log stands in the place of PROFILE]",
+            show_default=False,
         ),
-    ],
+    ] = None,
     quantile: Annotated[
         float,
         typer.Option(
@@ -334,6 +335,17 @@ def measured_command(
     channel: Annotated[
         str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
     ] = None,
+    bit_rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATE",
+            help="Without PROFILE: bit rate of the bus [kbit/s].  [default: that of back-to-back frames in the log]",
+        ),
+    ] = None,
+    data_bit_rate: Annotated[
+        float | None,
+        typer.Option(metavar="RATE", help="Without PROFILE: bit rate of the data of CAN FD [kbit/s].  [default: 2000]"),
+    ] = None,
     apply: Annotated[
         bool,
         typer.Option(
@@ -342,16 +354,23 @@ def measured_command(
             "your own comments stay.",
         ),
     ] = False,
-) -> "Report":
-    """Compare a recording of the machine's bus with its plan.
+) -> "Answer | Report":
+    """Compare a recording of the machine's bus with its plan, or say what a CAN log has.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
     within the plan: jitter, times, load and bytes at most as planned, or beyond it by no more than U. A figure that the
     recording cannot show has the reason instead. On EtherCAT record all packets of the master's port, both ways. Times
     are in us. `busplan manual measured` says how each figure is measured. Exits 0 whatever the figures.
 
+    Of a CAN log without PROFILE it says which identifiers there are and when they come, the load, the gaps, errors and
+    emergencies, and what the stamps show.
+
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """
+    if recording is None:
+        return _recorded(call, {"--apply": apply, "--quantile": quantile != 1}, bit_rate, data_bit_rate, channel)
+    if bit_rate is not None or data_bit_rate is not None:
+        raise BusplanError("--bit-rate: the profile has it, as bus.bit_rate_kbit_s; --set changes it")
     if apply:
         require_own_file(call.argument)
     with progress_bar("recording") as progress:
@@ -362,6 +381,28 @@ def measured_command(
     if apply:
         _write_edits(call, seen, words=", ".join(seen.edits))
     return seen.report(applied_to=call.argument if apply else None)
+
+
+def _recorded(
+    call: Call,
+    for_profile: Mapping[str, bool],
+    bit_rate: float | None,
+    data_bit_rate: float | None,
+    channel: str | None,
+) -> "Answer":
+    """What a recording has that is the only argument."""
+    from busplan.profile.sources import shipped_names
+
+    name = call.argument
+    if name.endswith(".toml") or name in shipped_names():
+        raise BusplanError(f"{name}: is a profile: give a recording behind it, or a CAN log alone")
+    given = [option for option, is_given in {**for_profile, "--set": bool(call.changes.entries)}.items() if is_given]
+    if given:
+        raise BusplanError(f"{given[0]}: needs a profile: busplan measured PROFILE {name}")
+    with progress_bar("recording") as progress:
+        return busplan.recorded(
+            name, bit_rate_kbit_s=bit_rate, data_bit_rate_kbit_s=data_bit_rate, channel=channel, progress=progress
+        )
 
 
 @command("For a machine that differs from its plan.", period="one", answers=False)

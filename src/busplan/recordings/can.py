@@ -7,6 +7,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
+from math import nan
 from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, Final, NamedTuple, cast
@@ -20,13 +21,20 @@ from busplan.extras import require_extra
 from busplan.files import require_regular
 from busplan.progress import Progress
 from busplan.recordings.capture import SOCKETCAN, CaptureNotes, is_capture, packets
-from busplan.recordings.statistics import Floats
+from busplan.recordings.statistics import Events, Floats
 from busplan.recordings.written import SYNTHETIC
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
-_ROW: Final = Struct("<dIQBBI")
+_ROW: Final = Struct("<dIIQBB")
 _ROW_FIELDS: Final = np.dtype(
-    [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1"), ("number", "<u4")]
+    [
+        ("stamp_s", "<f8"),
+        ("number", "<u4"),
+        ("identifier", "<u4"),
+        ("data", "<u8"),
+        ("dlc", "u1"),
+        ("flags", "u1"),
+    ]
 )
 """Data type of a frame while a log is read."""
 _ERROR_ROW: Final = Struct("<dI")
@@ -38,12 +46,11 @@ _FORMATS: Final = "text of candump, Vector's ASC and BLF, PEAK's TRC, captures o
 _LINE: Final = re.compile(
     r"(?:\([ \t]*(?P<stamp>[^\s)]+)\)[ \t]+)?(?P<channel>\S+)[ \t]+(?:(?P<frame>[0-9A-Fa-f]+#\S*)(?: [RT])?|"
     r"(?:[RT]X (?P<switch>[B-]) [E-] +)?(?P<identifier>[0-9A-F]{3}|[0-9A-F]{8}) +\[(?P<size>\d{1,2})\] *"
-    r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *'.*')?)"
+    r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *(?:'.*'|ERRORFRAME))?)"
 )
 """Line of `candump -l`, or of candump's output on a terminal."""
 _CLASSICAL_SIZE: Final = 1
 """Digits of a classical frame's size on a terminal; an FD frame has two."""
-_STAMP: Final = re.compile(r"\([ \t]*([^\s)]+)\)")
 _ERROR_FRAME: Final = "20000080"
 """Identifier of an error frame in `candump -l`."""
 _PACKET: Final = Struct(">IBB2x")
@@ -91,27 +98,32 @@ class CanFrames(NamedTuple):
     """Stamp of the first frame [s], since 1970 if the log says so."""
     times_us: Floats
     """Stamps after the first one [us]."""
+    numbers: npt.NDArray[np.uint32]
+    """Number of each frame among all of the log, from 1; of a capture that of the packet."""
     identifiers: npt.NDArray[np.int64]
     extended: npt.NDArray[np.bool_]
     sizes: npt.NDArray[np.int64]
     """Data bytes by the DLC; 8 for a DLC of 9 to 15 in a classical frame [bytes]."""
+    data: npt.NDArray[np.uint64]
+    """First 8 bytes of data, the first one in the highest bits; 0 where there are fewer."""
     bits: npt.NDArray[np.int64]
     """Bits on the wire, interframe space included; 0 for a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
     """Whether the frame is one of CAN FD."""
     switched: npt.NDArray[np.bool_]
     """Whether its data are at the data bit rate (BRS)."""
-    numbers: npt.NDArray[np.int64]
-    """Number of each frame in the file, from 1; error frames and those of other channels count."""
-    data: npt.NDArray[np.uint64]
-    """The first 8 bytes of the data, the first one in the highest bits."""
     remote: int
     errors_us: Floats
-    """Stamps of the error frames, which are not among the n (remote frames are), after the first frame [us]."""
+    """Stamps of the error frames, which are not among the n (remote frames are), after the first frame [us].
+
+    NaN for one without a stamp.
+    """
     error_numbers: npt.NDArray[np.int64]
-    """Numbers of the error frames in the file, from 1."""
+    """Number of each error frame, as those of frames."""
     broken: str
     """Reason why the log ends early; empty for a whole one."""
+    lead_us: float = 0.0
+    """Time from the first frame of the log, of any channel, to the first of these [us]."""
     synthetic: str = ""
     """Words of the log on its emulation; empty without them."""
     dropped: int | None = None
@@ -121,6 +133,16 @@ class CanFrames(NamedTuple):
     def errors(self) -> int:
         """Number of error frames."""
         return len(self.errors_us)
+
+    def events(self, values: Floats, frames: npt.NDArray[np.int64]) -> Events:
+        """Events of some values, each of a frame by its index."""
+        return Events(values, (self.times_us[frames] + self.lead_us) / 1e6, self.numbers[frames])
+
+    def error_events(self) -> Events:
+        """Error frames that have a stamp."""
+        known = np.isfinite(self.errors_us)
+        times_s = (self.errors_us[known] + self.lead_us) / 1e6
+        return Events(np.ones(len(times_s)), times_s, self.error_numbers[known])
 
 
 def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> CanFrames:
@@ -159,7 +181,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
                 reader = _bounded_blf()(file)
             else:
                 reader = getattr(can, name)(cast("Any", _Lines(file)))
-            log.read(reader, lambda: progress(min(file.tell(), size), size))
+            log.read(enumerate(reader, start=1), lambda: progress(min(file.tell(), size), size))
     except _DamageError as error:
         log.broken = str(error)
     except BusplanError:
@@ -194,6 +216,8 @@ class _CandumpText(_Lines):
         super().__init__(file)
         self._path = path
         self._has_begun = False
+        self._last = "(0.0) can"
+        """Stamp and channel of the last frame, for an error frame without them."""
 
     def __iter__(self) -> Iterator[str]:
         for number, content in enumerate(super().__iter__(), start=1):
@@ -205,8 +229,7 @@ class _CandumpText(_Lines):
         match = _LINE.fullmatch(line)
         if match is None:
             if "ERRORFRAME" in line:
-                stamp = _STAMP.match(line)
-                return f"({stamp[1] if stamp else 0.0}) can {_ERROR_FRAME}#"
+                return f"{self._last} {_ERROR_FRAME}#"
             if not self._has_begun:
                 raise BusplanError(f"{self._path}: is not a CAN log in a known format: {_FORMATS}")
             raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
@@ -219,7 +242,8 @@ class _CandumpText(_Lines):
             mark = f"##{int(match['switch'] == 'B')}" if is_fd else "#"
             content = f"R{match['size']}" if data.startswith("r") else data
             frame = f"{match['identifier']}{mark}{content}"
-        return f"({match['stamp']}) {match['channel']} {frame}"
+        self._last = f"({match['stamp']}) {match['channel']}"
+        return f"{self._last} {frame}"
 
 
 class _CapturedFrame(NamedTuple):
@@ -237,17 +261,18 @@ class _CapturedFrame(NamedTuple):
     data: bytes
 
 
-def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_CapturedFrame]:
-    """Frames of a SocketCAN capture."""
+def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[tuple[int, _CapturedFrame]]:
+    """Frames of a SocketCAN capture, each with the number of its packet."""
     notes = CaptureNotes()
     for piece in packets(path, notes, link=SOCKETCAN, progress=progress):
         content = piece.content.tobytes()
-        for start, size, stamp_ns in zip(piece.starts, piece.sizes, piece.times_ns, strict=True):
+        log.start_s = None if notes.start_ns is None else notes.start_ns / 1e9
+        for start, size, stamp_ns, number in zip(*piece[1:], strict=True):
             if size < _PACKET.size:
                 continue
             flagged, length, flags = _PACKET.unpack_from(content, start)
             is_extended = bool(flagged & _EXTENDED_FLAG)
-            yield _CapturedFrame(
+            frame = _CapturedFrame(
                 int(stamp_ns) / 1e9,
                 0,
                 flagged & ((1 << 29 if is_extended else 1 << 11) - 1),
@@ -259,6 +284,7 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_Captured
                 length,
                 content[start + _PACKET.size : start + min(size, _PACKET.size + length)],
             )
+            yield int(number), frame
         if len(notes.interfaces) > 1:
             raise BusplanError(f"{path}: has frames of {len(notes.interfaces)} interfaces; export those of one bus")
     log.synthetic = notes.synthetic
@@ -315,20 +341,24 @@ class _Log:
         self._channels: Counter[object] = Counter()
         self._errors = bytearray()
         self.dropped: int | None = None
+        self.start_s: float | None = None
+        """Stamp of the first frame of any channel [s]."""
         self.broken = self.synthetic = ""
 
-    def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
-        """Store all messages."""
-        number, last_s = 0, None
-        for message in messages:
-            number += 1
+    def read(self, messages: Iterator[tuple[int, Any]], report: Callable[[], None]) -> None:
+        """Store all messages, each given with its number."""
+        last_s = None
+        for number, message in messages:
             if not number % _REPORT_EVERY:
                 with suppress(OSError, ValueError):
                     report()
+            has_stamp = 0 <= message.timestamp < _END_S
+            if self.start_s is None and has_stamp:
+                self.start_s = message.timestamp
             if max(len(self._rows) // _ROW.size, len(self._errors) // _ERROR_ROW.size) >= _MOST_FRAMES:
                 raise _DamageError(f"it has more than {_MOST_FRAMES:,} frames; give a part of it")
             if message.is_error_frame:
-                self._errors += _ERROR_ROW.pack(message.timestamp, number)
+                self._errors += _ERROR_ROW.pack(message.timestamp if has_stamp else nan, number)
                 continue
             _require_frame(message, last_s)
             last_s = message.timestamp
@@ -343,11 +373,11 @@ class _Log:
             is_switched = is_fd and message.bitrate_switch
             self._rows += _ROW.pack(
                 last_s,
+                number,
                 message.arbitration_id,
                 int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"),
                 message.dlc,
                 message.is_extended_id * _EXTENDED | is_remote * _REMOTE | is_fd * _FD | is_switched * _SWITCHED,
-                number,
             )
 
     def frames(self, path: Path) -> CanFrames:
@@ -355,11 +385,11 @@ class _Log:
         if not self._rows:
             why = f" ({self.broken})" if self.broken else ""
             number = len(self._errors) // _ERROR_ROW.size
-            errors = f" but {plural(number, 'error frame')}" if number else ""
+            but = f" but {plural(number, 'error frame')}" if number else ""
             if self._channel is not None and self._channels:
                 names = first_of([*map(_shown, self._channels)], _SHOWN_CHANNELS)
                 raise BusplanError(f"{path}: channel {_shown(self._channel)}: no such channel; there are {names}")
-            raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
+            raise BusplanError(f"{path}: has no CAN frame{but}{why}")
         if len(self._channels) > 1 and self._channel is None:
             counts = self._channels.most_common()
             named = first_of(
@@ -376,18 +406,19 @@ class _Log:
         return CanFrames(
             float(stamps[0]),
             (stamps - stamps[0]) * 1e6,
+            rows["number"].copy(),
             identifiers,
             extended,
             np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
+            rows["data"].copy(),
             np.where(fd, 0, written_bits(identifiers, extended, remote, codes, rows["data"])),
             fd,
             switched,
-            rows["number"].astype(np.int64),
-            rows["data"],
             int(np.count_nonzero(remote)),
             (errors["stamp_s"] - stamps[0]) * 1e6,
             errors["number"].astype(np.int64),
             self.broken,
+            float(stamps[0] - (stamps[0] if self.start_s is None else self.start_s)) * 1e6,
             self.synthetic or f"{SYNTHETIC} by the name of its channel" * (SYNTHETIC in self._channels),
             self.dropped,
         )

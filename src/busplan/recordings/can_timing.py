@@ -16,6 +16,14 @@ LISTED: Final = 6
 """Identifiers that a sentence lists, at most."""
 MOST_BIT_RATE: Final = 1000.0
 """Highest bit rate of classical CAN [kbit/s]."""
+_BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
+"""Usual bit rates [kbit/s]."""
+_NEAR: Final = 0.02
+"""Share by which frames in direct succession may seem to be off a bit rate, by their stamps [1]."""
+_ABOUT: Final = 0.9
+"""Share of a bit rate from which frames seem to be in direct succession [1]."""
+_SHARP: Final = 0.8
+"""Share of those frames at the bit rate itself, if it is that of the bus [1]."""
 _WINDOWS: Final = (10, 20, 30)
 """Numbers of frames over which stamps show a bit rate. Over two, errors of stamps dominate."""
 _LATE_SHARE: Final = 0.05
@@ -48,6 +56,8 @@ class SentFrames(NamedTuple):
     identifier: int
     extended: bool
     """Whether the identifier has 29 bits."""
+    frames: npt.NDArray[np.int64]
+    """Index of each frame in the log."""
     times_us: Floats
     most_bytes: int
     is_fd: bool
@@ -162,6 +172,7 @@ def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tu
         messages[identifier, bool(extended)] = SentFrames(
             identifier,
             bool(extended),
+            taken,
             times_us,
             int(frames.sizes[taken].max()),
             bool(frames.is_fd[taken].any()),
@@ -179,24 +190,25 @@ def _is_periodic(periods: PeriodicEvents, length_us: float) -> bool:
     return is_row and is_even
 
 
-def fullest_load(times_us: Floats, wire_us: Floats) -> float:
-    """Load of the fullest second, or of all of a shorter log, whose first frame ended with its stamp [1].
+def second_loads(times_us: Floats, wire_us: Floats) -> Floats:
+    """Load of the second from each frame on, or of all of a shorter log, whose first frame ended with its stamp [1].
 
-    Of n frames, stamps are ascending and not all alike, and `wire_us` are the times on the wire [us].
+    Of n frames, stamps are ascending and not all alike, and `wire_us` are the times on the wire [us]. The result has
+    shape (n,), or (1,) for a shorter log.
 
     Examples
     --------
-    >>> fullest_load(np.array([0.0, 0.5e6, 1.2e6, 2.3e6]), np.array([100.0, 200, 300, 400]))
+    >>> float(second_loads(np.array([0.0, 0.5e6, 1.2e6, 2.3e6]), np.array([100.0, 200, 300, 400])).max())
     0.0005
-    >>> fullest_load(np.array([0.0, 1e3]), np.array([100.0, 200]))
-    0.2
+    >>> second_loads(np.array([0.0, 1e3]), np.array([100.0, 200])).tolist()
+    [0.2]
     """
     span_us = float(times_us[-1] - times_us[0])
     if span_us < WINDOW_US:
-        return float(wire_us[1:].sum()) / span_us
+        return np.array([float(wire_us[1:].sum()) / span_us])
     sent_us = np.concatenate(([0.0], np.cumsum(wire_us)))
     ends = np.searchsorted(times_us, times_us + WINDOW_US, side="left")
-    return float((sent_us[ends] - sent_us[:-1]).max()) / WINDOW_US
+    return np.asarray(sent_us[ends] - sent_us[:-1]) / WINDOW_US
 
 
 def step_us(stretch: ClockStretch) -> float:
@@ -217,6 +229,8 @@ class LeastBitRate(NamedTuple):
     """Bound for stamps as late as with most drivers."""
     surely: float
     """Bound for stamps up to a millisecond late."""
+    rates: Floats
+    """Likely bound from the frames from each frame of the stretch on, n of them; 0 where too few follow."""
 
 
 def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
@@ -234,8 +248,12 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
         return np.asarray(1000 * between / np.maximum(window_us, _LEAST_US), dtype=np.float64)
 
-    def most(windows: Sequence[int], late_us: float) -> float:
-        return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
+    def most(windows: Sequence[int], late_us: float) -> Floats:
+        of_first = np.zeros(len(bits))
+        for count in windows:
+            if len(bits) > count:
+                np.maximum(of_first[:-count], rates(count, late_us), out=of_first[:-count])
+        return of_first
 
     closer = rates(1, 0.0) > MOST_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
     windows: Sequence[int] = (4, *_WINDOWS)
@@ -244,7 +262,44 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
         starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
         at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / MOST_BIT_RATE
         windows, late_us = _WINDOWS, min(at_once_us, _LATEST_US)
-    return LeastBitRate(most(windows, late_us), most(windows, _LATEST_US))
+    likely = most(windows, late_us)
+    return LeastBitRate(float(likely.max()), float(most(windows, _LATEST_US).max()), likely)
+
+
+def require_bit_rate(bit_rate_kbit_s: float, least: LeastBitRate) -> None:
+    """Raise BusplanError for a bit rate at which the frames of a log would overlap [kbit/s]."""
+    if bit_rate_kbit_s < least.surely:
+        raise BusplanError(
+            f"bit rate {bit_rate_kbit_s:g}: frames of the log need at least {least.surely:.3g} kbit/s, because they do "
+            "not overlap"
+        )
+
+
+def possible_bit_rates(least: LeastBitRate) -> list[float]:
+    """Usual bit rates that are no less than a least one [kbit/s]."""
+    return [rate for rate in _BIT_RATES if rate >= least.surely]
+
+
+def shown_bit_rate(frames: CanFrames, stretch: ClockStretch, possible: Sequence[float]) -> float | None:
+    """Least of some bit rates at which frames follow each other; None where none is shown [kbit/s]."""
+    bits, apart_us = frames.bits[stretch.taken][1:], np.diff(stretch.times_us)
+    rates = 1000 * bits / np.maximum(apart_us, _LEAST_US)
+    return next((rate for rate in possible if _is_shown(rate, rates)), None)
+
+
+def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:
+    """Whether frames follow each other as at a bit rate, with hardly any closer or a little later."""
+    near = np.count_nonzero(np.abs(rates / bit_rate_kbit_s - 1) <= _NEAR)
+    return bool(near >= LEAST_EVENTS and near >= _SHARP * np.count_nonzero(rates >= _ABOUT * bit_rate_kbit_s))
+
+
+def late_stamps_us(frames: CanFrames, stretch: ClockStretch, bit_us: float) -> float:
+    """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us]."""
+    sent_us = np.concatenate(([0.0], frames.bits[stretch.taken].cumsum() * bit_us))
+    ahead_us = [wire_us - stretch.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
+    late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
+    # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
+    return late_us + float(frames.bits.max()) * bit_us if late_us > step_us(stretch) else late_us
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:

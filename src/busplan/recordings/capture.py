@@ -62,6 +62,8 @@ class CapturedPackets(NamedTuple):
     """Recorded size of each packet [bytes]."""
     times_ns: Numbers
     """Stamps since 1970 [ns]."""
+    numbers: Numbers
+    """Number of each packet in the file, from 1, as Wireshark counts: those that are left out have one, too."""
 
 
 @dataclass
@@ -69,6 +71,8 @@ class CaptureNotes:
     """Facts on a capture besides its packets: counts, marks and damage."""
 
     packets: int = 0
+    start_ns: int | None = None
+    """Stamp of the first packet of the link type [ns]; None without one."""
     left_out: int = 0
     """Packets of interfaces of another link type, without a stamp, or with a damaged one."""
     dropped: int = 0
@@ -114,7 +118,7 @@ def _pieces(
     head = file.read(24)
     walker: _Walker
     if head[:4] in _PCAP:
-        walker, held, at = _Pcap(head, path, link), b"", len(head)
+        walker, held, at = _Pcap(head, path, notes, link), b"", len(head)
     elif head[:4] == _SECTION:
         walker, held, at = _PcapNg(notes, link), head, 0
     else:
@@ -124,12 +128,13 @@ def _pieces(
         content = held + file.read(_PIECE_BYTES)
         rows, used = walker.walk(content)
         if rows:
-            starts, sizes, times = np.array(rows, dtype=np.int64).T
+            starts, sizes, times, numbers = np.array(rows, dtype=np.int64).T
             leaps = np.flatnonzero(np.diff(times, prepend=times[0] if before is None else before) > _LONGEST_NS)
             good = slice(leaps[0] if len(leaps) else None)
             notes.packets += len(starts[good])
             if len(starts[good]):
-                yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts[good], sizes[good], times[good])
+                whole = np.frombuffer(content, dtype=np.uint8)
+                yield CapturedPackets(whole, starts[good], sizes[good], times[good], numbers[good])
             if len(leaps):
                 notes.broken_at = at + int(starts[leaps[0]])
                 return
@@ -154,13 +159,25 @@ class _Walker(ABC):
     is_broken = False
     """Whether a record is damaged, so that the next cannot be found."""
 
+    def __init__(self, notes: CaptureNotes) -> None:
+        self.notes = notes
+        self._packets = 0
+
+    def number(self, time_ns: int | None = None) -> int:
+        """Number of the next packet, which may have a stamp [ns]."""
+        self._packets += 1
+        if self.notes.start_ns is None:
+            self.notes.start_ns = time_ns
+        return self._packets
+
     @abstractmethod
-    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
-        """Offset, size and stamp of each whole packet, and the number of bytes used."""
+    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int, int]], int]:
+        """Offset, size, stamp and number of each whole packet, and the number of bytes used."""
 
 
 class _Pcap(_Walker):
-    def __init__(self, head: bytes, path: Path, wanted: int) -> None:
+    def __init__(self, head: bytes, path: Path, notes: CaptureNotes, wanted: int) -> None:
+        super().__init__(notes)
         order, self._tick_ns = _PCAP[head[:4]]
         if len(head) < 24:  # noqa: PLR2004 - the header of the file
             raise BusplanError(f"{path}: ends within the header of a pcap file")
@@ -169,7 +186,7 @@ class _Pcap(_Walker):
             raise BusplanError(f"{path}: is a capture of link type {link}, expected {wanted}, {_LINKS[wanted]}")
         self._header = Struct(f"{order}IIII")
 
-    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
+    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int, int]], int]:
         rows, at, end = [], 0, len(content) - self._header.size
         while at <= end:
             seconds, ticks, size, _ = self._header.unpack_from(content, at)
@@ -178,7 +195,8 @@ class _Pcap(_Walker):
                 break
             if at + 16 + size > len(content):
                 break
-            rows.append((at + 16, size, seconds * _NS + ticks * self._tick_ns))
+            time_ns = seconds * _NS + ticks * self._tick_ns
+            rows.append((at + 16, size, time_ns, self.number(time_ns)))
             at += 16 + size
         return rows, at
 
@@ -197,11 +215,12 @@ class _PcapNg(_Walker):
     """Structs in the section's byte order: head of a block (kind, size), and fields of a packet."""
 
     def __init__(self, notes: CaptureNotes, link: int) -> None:
-        self._notes, self._link = notes, link
+        super().__init__(notes)
+        self._link = link
         self._interfaces: list[_Interface] = []
 
-    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
-        rows: list[tuple[int, int, int]] = []
+    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int, int]], int]:
+        rows: list[tuple[int, int, int, int]] = []
         at = 0
         while at + 12 <= len(content):
             is_section = content[at : at + 4] == _SECTION
@@ -224,8 +243,8 @@ class _PcapNg(_Walker):
             at += size
         return rows, at
 
-    def _block(self, rows: list[tuple[int, int, int]], kind: int, content: bytes, at: int, size: int) -> None:
-        end, notes = at + size - 4, self._notes
+    def _block(self, rows: list[tuple[int, int, int, int]], kind: int, content: bytes, at: int, size: int) -> None:
+        end, notes = at + size - 4, self.notes
         if kind == _PACKET and size >= 32:  # noqa: PLR2004 - the fields of a packet
             number, high, low, kept = self._fields.unpack_from(content, at + 8)
             kept = min(kept, size - 32)
@@ -238,6 +257,7 @@ class _PcapNg(_Walker):
             notes.dropped += dropped if dropped != _NOT_COUNTED else 0
             self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
         elif kind == _SIMPLE_PACKET:
+            self.number()
             notes.left_out += 1
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : end]))
@@ -245,15 +265,16 @@ class _PcapNg(_Walker):
             # A block of statistics counts all drops of its interface so far, those already counted by packets included.
             notes.dropped = max(notes.dropped, self._dropped(content[at + 20 : end], _STATISTICS))
 
-    def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
+    def _packet(self, rows: list[tuple[int, int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
         if number < len(self._interfaces):
             interface = self._interfaces[number]
             time_ns = ticks * _NS // interface.ticks + interface.offset_ns
             if interface.link == self._link and 0 <= time_ns < _END_NS:
-                self._notes.interfaces.add(number)
-                rows.append((at, size, time_ns))
+                self.notes.interfaces.add(number)
+                rows.append((at, size, time_ns, self.number(time_ns)))
                 return
-        self._notes.left_out += 1
+        self.number()
+        self.notes.left_out += 1
 
     def _dropped(self, options: bytes, kind: int) -> int:
         """Number of dropped packets in the options of a block."""
@@ -269,7 +290,7 @@ class _PcapNg(_Walker):
         for code, value in self._options(options):
             text = printable(value[:_MOST_WORDS].decode("utf-8", "replace"))
             if code == _COMMENT and text.startswith(f"{SYNTHETIC}:"):
-                self._notes.synthetic = text
+                self.notes.synthetic = text
 
     def _options(self, content: bytes) -> Iterator[tuple[int, bytes]]:
         """Code and value of each option."""

@@ -12,6 +12,7 @@ from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, packets
+from busplan.recordings.statistics import Events, Floats
 from busplan.recordings.written import SYNTHETIC, SYNTHETIC_PORT
 
 _TYPE: Final = 0x88A4
@@ -83,6 +84,13 @@ class EthercatFrames(NamedTuple):
     """Broadcast writes whose port receive times were read."""
     unlatched: int
     """Number of reads of port receive times without a broadcast write before."""
+    numbers: npt.NDArray[np.int32]
+    """Number of each frame's packet in the file, from 1."""
+
+    def events(self, values: Floats, frames: Numbers) -> Events:
+        """Events of some values, each of a frame by its index."""
+        times_s = (self.times_ns[frames] - (self.notes.start_ns or 0)) / 1e9
+        return Events(values, times_s, self.numbers[frames])
 
 
 def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
@@ -127,19 +135,21 @@ class _Reader:
         if not fits.any():
             return
         starts, at, ends, times = piece.starts[fits], at[fits] + 4, ends[fits], piece.times_ns[fits]
+        numbers = piece.numbers[fits].astype(np.int32)
         whole, key_rows, counter_rows, on_port_times = _datagrams(content, at, ends)
         self._cut += int(np.count_nonzero(~whole))
         for frame, header in sorted(on_port_times):
             if whole[frame] and content[starts[frame] + 6] & _DEVICES_BIT:
                 self._port_times(content[header:])
         starts, times, key_rows, counter_rows = starts[whole], times[whole], key_rows[whole], counter_rows[whole]
+        numbers = numbers[whole]
         if not len(starts):
             return
         returned = content[starts + 6] & _DEVICES_BIT != 0
         keys = _row_numbers(key_rows, self._keys, self._new_key)
         counters = _row_numbers(counter_rows, self._counters, lambda _: None)
         self._count_masters(content, starts[~returned])
-        self._parts.append((times, returned, keys.astype(np.int32), counters.astype(np.int32)))
+        self._parts.append((times, returned, keys.astype(np.int32), counters.astype(np.int32), numbers))
 
     def _count_masters(self, content: npt.NDArray[np.uint8], starts: Numbers) -> None:
         address = np.zeros(len(starts), dtype=np.int64)
@@ -199,7 +209,7 @@ class _Reader:
             )
         if int.from_bytes(SYNTHETIC_PORT) in self._masters:
             notes.synthetic = notes.synthetic or f"{SYNTHETIC} by the address of its port"
-        times, returned, keys, counters = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        times, returned, keys, counters, numbers = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         layouts = tuple(map(_datagrams_of, self._layouts))
         layout = np.array(self._layout_of_key, dtype=np.int64)[keys]
         return EthercatFrames(
@@ -214,6 +224,7 @@ class _Reader:
             self._cut,
             tuple(latch for latch in self._latches if latch.ports_ns),
             self._unlatched,
+            numbers,
         )
 
 

@@ -1,7 +1,7 @@
 """Period, lateness and quantiles of events, from their stamps."""
 
 from math import ceil, hypot, inf, log, sqrt
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,8 @@ _AHEAD: Final = 20
 """Events after a block that are also read, so that a late event at its end is seen."""
 _ROUNDING: Final = 1e-6
 """Events by which float rounding may lift a point over a line."""
+_DECIMALS: Final = 9
+"""Decimals of a time in seconds; stamps have no more."""
 _COVERAGE: Final = 2
 """Coverage factor k of an expanded uncertainty."""
 
@@ -40,6 +42,23 @@ class Quantile(NamedTuple):
     value: float
     uncertainty: float | None
     """Standard uncertainty; None where too few values lie beyond the quantile, as for the largest."""
+
+
+class Events(NamedTuple):
+    """Events that a recorded figure is made of, n of them in any order."""
+
+    values: Floats
+    """Value of each in the unit of the figure; of a count, how much each adds to it."""
+    times_s: Floats
+    """Time of each from the first frame of the recording [s]."""
+    frames: npt.NDArray[np.integer[Any]]
+    """Number of the frame of each in the recording, from 1."""
+
+    def earliest(self, chosen: npt.NDArray[np.bool_]) -> tuple[float, int]:
+        """Time [s] and frame of the earliest of the chosen events, of which there is at least one."""
+        places = np.flatnonzero(chosen)
+        place = places[np.lexsort((self.frames[places], self.times_s[places]))[0]]
+        return round(float(self.times_s[place]), _DECIMALS), int(self.frames[place])
 
 
 class PeriodicEvents(NamedTuple):
@@ -59,6 +78,23 @@ class PeriodicEvents(NamedTuple):
     def missing(self) -> int:
         """Number of periods without an event."""
         return int(self.places[-1]) + 1 - len(self.places)
+
+    @property
+    def gaps(self) -> tuple[npt.NDArray[np.int64], Floats]:
+        """Index of each event with periods without one behind it, and the number of these periods."""
+        behind = np.diff(self.places) - 1
+        before = np.flatnonzero(behind)
+        return before, behind[before].astype(np.float64)
+
+
+class Lateness(NamedTuple):
+    """Delay of a quantile of events after the earliest."""
+
+    value: float
+    uncertainty: float
+    """Standard uncertainty [us]."""
+    late_us: Floats
+    """Delay of each event after the earliest [us]."""
 
 
 def quantile(values: Floats, share: float) -> Quantile:
@@ -82,7 +118,7 @@ def quantile(values: Floats, share: float) -> Quantile:
     return Quantile(value, float(ordered[high - 1] - ordered[low - 1]) / (2 * _COVERAGE))
 
 
-def lateness(events: PeriodicEvents, share: float) -> Quantile:
+def lateness(events: PeriodicEvents, share: float) -> Lateness:
     """Delay of a quantile of the events after the earliest [us].
 
     The period is uncertain, so the most favourable one counts, which has the least delay. The uncertainty covers the
@@ -106,7 +142,7 @@ def lateness(events: PeriodicEvents, share: float) -> Quantile:
     value = latest.value + earliest.value
     others = max(spread_us(sign * _COVERAGE * events.uncertainty_us) for sign in (-1, 1)) - value
     parts = latest.uncertainty or 0.0, earliest.uncertainty or 0.0, max(others, 0.0) / _COVERAGE, events.doubt_us
-    return Quantile(value, hypot(*parts))
+    return Lateness(value, hypot(*parts), late + earliest.value)
 
 
 def _ranked(values: Floats, share: float) -> float:

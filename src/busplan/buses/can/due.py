@@ -18,14 +18,16 @@ class DuePdos(NamedTuple):
 
     cycles: npt.NDArray[np.int64]
     """Number of the SYNC at which each PDO was due."""
+    pdos: npt.NDArray[np.int64]
+    """Index of each PDO; those before the first SYNC at which one is due are left out."""
     late_us: Floats
     """Time of each PDO after this SYNC [us]."""
     due: int
     """PDOs that were due."""
-    missing: int
-    """PDOs that never came."""
-    twice: int
-    """PDOs that came again for one SYNC."""
+    missing: npt.NDArray[np.int64]
+    """Number of the SYNC of each PDO that never came."""
+    twice: npt.NDArray[np.int64]
+    """Index of each PDO that came again for one SYNC."""
 
 
 def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDArray[np.bool_] | None = None) -> DuePdos:
@@ -41,19 +43,21 @@ def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDAr
     --------
     The second of five is late, so that it comes with the third; the fifth SYNC is the last, and nobody knows of it:
 
-    >>> due_pdos(np.arange(5) * 100.0, np.array([30.0, 210, 230, 330]), every=1)[1:]
-    (array([ 30., 110.,  30.,  30.]), 4, 0, 0)
+    >>> found = due_pdos(np.arange(5) * 100.0, np.array([30.0, 210, 230, 330]), every=1)
+    >>> found.late_us.tolist(), found.due, found.missing.tolist(), found.twice.tolist()
+    ([30.0, 110.0, 30.0, 30.0], 4, [], [])
     """
     sent = np.ones(len(sync_us), dtype=np.bool_) if is_sent is None else is_sent
     due = _due_at(sync_us, times_us, every, sent)
     cycles = np.searchsorted(sync_us[due], times_us, side="right") - 1
-    times_us, cycles = times_us[cycles >= 0], cycles[cycles >= 0]
+    pdos = np.flatnonzero(cycles >= 0)
+    times_us, cycles = times_us[pdos], cycles[pdos]
     # After the last SYNC the log may end.
     whole = len(due) - 1
     counts = np.bincount(cycles, minlength=len(due))[:whole]
     first = np.searchsorted(cycles, np.arange(len(due) + 1))
     missing: list[int] = []
-    twice = 0
+    twice: list[int] = []
     for place in np.flatnonzero(counts != 1).tolist():
         if not counts[place]:
             missing += [place] if sent[due[place]] else []
@@ -61,10 +65,15 @@ def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDAr
         for number in range(int(counts[place]) - 1):
             if not missing or place - missing[-1] > _MADE_UP:
                 # The log may begin with a PDO of a SYNC before it.
-                twice += int(counts[place]) - 1 - number if place else 0
+                twice += range(first[place] + number + 1, first[place + 1]) if place else ()
                 break
             cycles[first[missing.pop() + 1] : first[place + 1] - 1 - number] -= 1
-    return DuePdos(due[cycles], times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum()), len(missing), twice)
+    late_us, of_due = times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum())
+    return DuePdos(due[cycles], pdos, late_us, of_due, due[_places(missing)], pdos[_places(twice)])
+
+
+def _places(places: list[int]) -> npt.NDArray[np.int64]:
+    return np.array(places, dtype=np.int64)
 
 
 def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:

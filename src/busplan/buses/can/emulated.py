@@ -3,15 +3,15 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c
 from busplan.buses.can.streams import Stream, place, streams
-from busplan.buses.can.traffic import SYNC, traffic_of
+from busplan.buses.can.traffic import HOST, NODE, NOT_BY_PRIORITY, SYNC, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
-from busplan.buses.network import Network
+from busplan.buses.network import Group, Network
 from busplan.errors import BusplanError
 from busplan.recordings.can import written_bits
 from busplan.recordings.written import candump
@@ -20,6 +20,7 @@ _ERROR: Final = "20000088#0000000000000000"
 """An error frame as candump writes it."""
 _COUNTED: Final = 240
 """Last number of SYNC's counter, which runs from 1 (CiA 301)."""
+_FIFO: Final = NOT_BY_PRIORITY[0]
 _PAYLOADS: Final = 16
 """Payloads of a sender that differ."""
 
@@ -29,7 +30,15 @@ TWICE: Final = Fault("double-pdo", "a node sends its feedback twice", "PDOs twic
 LATE: Final = Fault("late-command", "the host sends its commands late", "last PDO after SYNC", "us", 1.0)
 JITTER: Final = Fault("jitter", "the host sends SYNC late", "SYNC: jitter of the arrival", "us", 0.5)
 ERRORS: Final = Fault("error-frame", "a frame is destroyed and sent again", "error frames")
-FAULTS: Final = (MISSING, SILENT, TWICE, LATE, JITTER, ERRORS)
+LOST: Final = Fault("lost-answer", "a node does not answer a request", "answers missing")
+DOUBLE: Final = Fault("double-answer", "a node answers a request twice", "answers twice")
+SLOW_NODE: Final = Fault("slow-node", "a node answers late", "request to answer", "us", 0.3)
+SLOW_HOST: Final = Fault("slow-host", "the host sends its next request late", "next request of the host", "us", 0.3)
+_OF_SYNC: Final = (MISSING, SILENT, TWICE, LATE, JITTER)
+_OF_REQUESTS: Final = (LOST, DOUBLE, SLOW_NODE, SLOW_HOST)
+FAULTS: Final = (*_OF_SYNC, *_OF_REQUESTS, ERRORS)
+_PATIENCE: Final = 2
+"""Planned times of an answer after which a host goes on without it."""
 
 
 class _Sender(NamedTuple):
@@ -41,6 +50,23 @@ class _Sender(NamedTuple):
     """Place in the arbitration."""
     frames: list[tuple[str, float]]
     """Frames as candump writes them, each with its time on the wire [us]."""
+    queue: str = ""
+    """Name of the queue that it shares with others, where that is not by priority."""
+
+
+class _Node(NamedTuple):
+    """A node that answers requests."""
+
+    group: Group
+    requests: tuple[_Sender, ...]
+    """Frames of its request, in their order."""
+    answers: tuple[_Sender, ...]
+
+    @property
+    def answers_us(self) -> float:
+        """Planned time from its request to its queued answer [us]."""
+        us: float = max(self.group.read_execution_us, self.group.write_execution_us)
+        return us
 
 
 _Queued = tuple[float, int, _Sender, int]
@@ -50,13 +76,19 @@ _Queued = tuple[float, int, _Sender, int]
 def emulated(network: Network, emulation: Emulation) -> bytes:
     """Emulate the log of a machine that keeps its plan, but for the faults.
 
-    Nodes queue their feedback T_exec behind SYNC, and up to the slowest extra time later; the host queues all commands
-    behind the last feedback and half to all of its time. SYNC comes evenly within its jitter. Messages come each by its
-    period and evenly within its jitter, a burst at once. Data are random. Stamps count from 0.
+    With SYNC nodes queue their feedback T_exec behind SYNC, and up to the slowest extra time later; the host queues all
+    commands behind the last feedback and half to all of its time. SYNC comes evenly within its jitter. Without SYNC the
+    host queues each request half to all of its time behind the answer before, or, of all at once, behind the request
+    before; a node queues its answer T_exec behind its request, and up to the slowest extra time later. Messages come
+    each by its period and evenly within its jitter, a burst at once. Of a queue that is not by priority one frame is in
+    the arbitration: the first one queued, or of a single buffer the one of the smallest identifier when it became free.
+    Data are random. Stamps count from 0.
 
-    Too many frames, and a fault of a cycle in a network of messages alone, raise a BusplanError.
+    Too many frames, and a fault that the plan has no place for, raise a BusplanError.
     """
-    return candump(_Machine(network, emulation).sent())
+    traffic = traffic_of(network)
+    sort = _Requests if traffic.has_cycle and not traffic.has_sync else _Machine
+    return candump(sort(network, emulation).sent())
 
 
 class _Machine:
@@ -65,11 +97,8 @@ class _Machine:
     def __init__(self, network: Network, emulation: Emulation) -> None:
         self.network, self.emulation, self.random = network, emulation, emulation.random
         self.traffic, self.period_us = traffic_of(network), _period_us(network)
-        if self.traffic.has_cycle and not self.traffic.has_sync:
-            raise BusplanError(f'a log with SYNC is emulated, and bus.access = "{self.traffic.access}" has none')
         self.end_us = emulation.cycles * self.period_us
-        if not self.traffic.has_cycle and (others := emulation.faults.keys() - {ERRORS.name}):
-            raise BusplanError(f"fault {min(others)}: a network of messages alone has no SYNC and no PDOs")
+        self._require_place()
         sent, unstuffed = streams(self.traffic), streams(replace(self.traffic, is_stuffed=False))
         emulation.require_few(sum(stream.identifiers * self.end_us / stream.period_us for stream in sent))
         self.senders = [sender for pair in zip(sent, unstuffed, strict=True) for sender in self._senders(*pair)]
@@ -77,11 +106,28 @@ class _Machine:
         cycles = range(emulation.cycles - int(max((pdos.every for pdos in self.traffic.pdos), default=1)))
         due = {name: [cycle for cycle in cycles if self._due(name, cycle)] for name in ("feedback", "command")}
         among = {SILENT: due["feedback"], TWICE: due["feedback"], LATE: due["command"]}
+        fastest = int(min((pdos.every for pdos in self.traffic.pdos), default=1))
+        among |= {fault: [cycle for cycle in cycles if not cycle % fastest] for fault in _OF_REQUESTS}
         self.hit = {fault: emulation.drawn(fault, among.get(fault, cycles)) for fault in FAULTS}
         self.left: dict[int, int] = {}
         """Feedback frames that have not arrived, by cycle."""
         self.queued = 0
         """Frames queued so far."""
+        self.pending: dict[str, list[tuple[int, int, _Sender, int]]] = {}
+        """Frames of each queue that is not by priority, the one in the arbitration first."""
+
+    def _require_place(self) -> None:
+        """Raise BusplanError for a fault that the plan has no place for."""
+        traffic, bus = self.traffic, self.network.profile.bus
+        none = "a network of messages alone has no SYNC and no PDOs"
+        known: tuple[Fault, ...] = ()
+        if traffic.has_sync:
+            none, known = "with SYNC nodes answer no requests", _OF_SYNC
+        elif traffic.has_cycle:
+            none, known = f'bus.access = "{bus.access}" has no SYNC', _OF_REQUESTS
+        others = [name for name in self.emulation.faults if name not in {fault.name for fault in (*known, ERRORS)}]
+        if others:
+            raise BusplanError(f"fault {min(others)}: {none}")
 
     def _senders(self, stream: Stream, unstuffed: Stream) -> Iterator[_Sender]:
         """Senders of a stream, which is also given without stuff bits: one an identifier, with random data."""
@@ -103,7 +149,28 @@ class _Machine:
                 wires_us = (bits * bit_us(self.traffic.bit_rate_kbit_s)).tolist()
             name = f"{identifier:0{8 if is_extended else 3}X}{mark}"
             frames = [f"{name}{part.hex().upper()}" for part in data]
-            yield _Sender(stream, place(identifier, stream.identifier_bits), list(zip(frames, wires_us, strict=True)))
+            order, taken = place(identifier, stream.identifier_bits), list(zip(frames, wires_us, strict=True))
+            yield _Sender(stream, order, taken, self._queue(stream, message, identifier - int(stream.first)))
+
+    def _queue(self, stream: Stream, message: Any, number: int) -> str:
+        """Name of the queue of a sender, by its place in its stream; empty where all that it sends goes by priority."""
+        profile, sender = self.network.profile, HOST
+        members = [member for member in profile.node_groups for _ in range(member.nodes)]
+        if message:
+            if message.sender is None and not message.per_node:
+                return ""
+            sender = message.sender or ""
+            first = next((place for place, member in enumerate(members) if (member.name or NODE) == sender), -1)
+            at = number if message.per_node else first
+        elif stream.name == "feedback":
+            group = next(group for group in self.network.groups if group.name == stream.group)
+            places = [place for place, member in enumerate(members) if member in group.members]
+            at = places[number * len(places) // int(stream.identifiers)]
+        else:
+            at = -1
+        node = members[at].node if at >= 0 else None
+        order = (node.queue if node is not None else None) or profile.bus.queue
+        return f"{at if node is not None else sender} {order}" if order in NOT_BY_PRIORITY else ""
 
     def _due(self, name: str, cycle: int) -> list[_Sender]:
         """Senders of SYNC, feedback or commands that a cycle has."""
@@ -155,6 +222,23 @@ class _Machine:
             late_us = self.emulation.faults.get(LATE.name, 0.0) * (cycle in self.hit[LATE])
             yield from (self._at(now_us + late_us, command, cycle) for command in self._due("command", cycle))
 
+    def _offer(self, waiting: list[tuple[int, int, _Sender, int]], queued: tuple[int, int, _Sender, int]) -> None:
+        """Put a frame into the arbitration, or into its queue behind the one that is there."""
+        queue = queued[2].queue
+        held = self.pending.setdefault(queue, []) if queue else []
+        held.append(queued)
+        if not queue or len(held) == 1:
+            heappush(waiting, queued)
+
+    def _next_of(self, waiting: list[tuple[int, int, _Sender, int]], queue: str) -> None:
+        """Put the next frame of a queue, whose first one has been sent, into the arbitration."""
+        held = self.pending[queue]
+        del held[0]
+        if held:
+            chosen = 0 if queue.endswith(_FIFO) else held.index(min(held, key=lambda queued: queued[:2]))
+            held.insert(0, held.pop(chosen))
+            heappush(waiting, held[0])
+
     def sent(self) -> Iterator[tuple[int, str]]:
         """Stamp of each frame at its end [us], and the frame: of those that wait the one of the first priority goes."""
         coming, waiting = list(self._alone()), list[tuple[int, int, _Sender, int]]()
@@ -165,7 +249,7 @@ class _Machine:
             now_us = now_us if waiting else max(now_us, coming[0][0])
             while coming and coming[0][0] <= now_us:
                 _, running, sender, number = heappop(coming)
-                heappush(waiting, (sender.order, running, sender, number))
+                self._offer(waiting, (sender.order, running, sender, number))
             _, running, sender, number = heappop(waiting)
             is_counter = sender.stream.name == SYNC
             frame, wire_us = (
@@ -176,12 +260,114 @@ class _Machine:
                 del errors[0]
                 frame, wire_us = _ERROR, wire_us / 2 + (c.ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
                 heappush(waiting, (sender.order, running, sender, number))
+            elif sender.queue:
+                self._next_of(waiting, sender.queue)
             now_us += wire_us
             if now_us >= self.end_us:
                 return
             yield int(now_us), frame
             for answer in () if is_destroyed else self._answers(sender, number, now_us):
                 heappush(coming, answer)
+
+
+class _Requests(_Machine):
+    """A machine whose nodes answer requests."""
+
+    def __init__(self, network: Network, emulation: Emulation) -> None:
+        super().__init__(network, emulation)
+        self.is_burst = self.traffic.access == "burst"
+        self.nodes = [node for group in network.groups for node in self._nodes(group)]
+        self.place_of = {
+            sender.order: number for number, node in enumerate(self.nodes) for sender in (*node.requests, *node.answers)
+        }
+        self.hit_place = {fault: self._place(fault) for fault in _OF_REQUESTS}
+        self.frames_left: dict[tuple[str, int, int], int] = {}
+        """Frames of a request or an answer that have not arrived, by name, number of the node, and cycle."""
+
+    def _nodes(self, group: Group) -> Iterator[_Node]:
+        """Nodes of a group in the order of their requests, one a PDO."""
+        frames = {
+            name: [
+                [sender for sender in self.senders if sender.stream is stream]
+                for stream in dict.fromkeys(sender.stream for sender in self.senders)
+                if (stream.name, stream.group) == (name, group.name) and not stream.is_message
+            ]
+            for name in ("command", "feedback")
+        }
+        for requests, answers in zip(
+            zip(*frames["command"], strict=True), zip(*frames["feedback"], strict=True), strict=True
+        ):
+            yield _Node(group, requests, answers)
+
+    def _place(self, fault: Fault) -> int:
+        """Number of the node that a fault hits: the second one of the fastest group, where there are several."""
+        fastest = min(int(node.group.every) for node in self.nodes)
+        places = [number for number, node in enumerate(self.nodes) if int(node.group.every) == fastest]
+        if fault is SLOW_HOST and fault.name in self.emulation.faults and len(places) < 2:  # noqa: PLR2004
+            raise BusplanError(f"fault {fault.name}: there is one node, and no next request in its cycle")
+        return places[min(1, len(places) - 1)]
+
+    def _is_hit(self, fault: Fault, number: int, cycle: int) -> bool:
+        return self.hit_place[fault] == number and cycle in self.hit[fault]
+
+    def _alone(self) -> Iterator[_Queued]:
+        yield from super()._alone()
+        if not self.is_burst:
+            yield from self._request(0, 0, 0.0)
+            return
+        for cycle in range(self.emulation.cycles):
+            queued_us = cycle * self.period_us
+            for number, node in enumerate(self.nodes):
+                if not cycle % int(node.group.every):
+                    queued_us += self._host_us(number, cycle)
+                    yield from self._sent(node.requests, "command", number, cycle, queued_us)
+
+    def _host_us(self, number: int, cycle: int) -> float:
+        """Time that the host takes for a request [us]."""
+        own_us: float = self.random.uniform(LEAST_SHARE, 1) * self.network.profile.bus.host_us
+        return own_us + self.emulation.faults.get(SLOW_HOST.name, 0.0) * self._is_hit(SLOW_HOST, number, cycle)
+
+    def _sent(
+        self, senders: tuple[_Sender, ...], name: str, number: int, cycle: int, queued_us: float
+    ) -> Iterator[_Queued]:
+        self.frames_left[name, number, cycle] = len(senders)
+        yield from (self._at(queued_us, sender, cycle) for sender in senders)
+
+    def _request(self, number: int, cycle: int, now_us: float) -> Iterator[_Queued]:
+        """The request to the next node that is due in a cycle; behind the last one the next cycle begins."""
+        while number < len(self.nodes) and cycle % int(self.nodes[number].group.every):
+            number += 1
+        if number < len(self.nodes):
+            queued_us = now_us + self._host_us(number, cycle)
+            yield from self._sent(self.nodes[number].requests, "command", number, cycle, queued_us)
+        elif (cycle := cycle + 1) < self.emulation.cycles:
+            yield from self._request(0, cycle, max(now_us, cycle * self.period_us))
+
+    def _answers(self, sender: _Sender, cycle: int, now_us: float) -> Iterator[_Queued]:
+        """Frames that a node queues when its request has arrived, and the host when the answer has."""
+        name = sender.stream.name
+        if sender.stream.is_message:
+            return
+        number = self.place_of[sender.order]
+        self.frames_left[name, number, cycle] -= 1
+        if self.frames_left[name, number, cycle]:
+            return
+        node = self.nodes[number]
+        if name == "feedback":
+            if not self.is_burst:
+                yield from self._request(number + 1, cycle, now_us)
+        elif self._is_hit(LOST, number, cycle):
+            if not self.is_burst:
+                patience_us = _PATIENCE * (node.answers_us + node.group.worst_extra_us)
+                patience_us += sum(answer.stream.frame_us for answer in node.answers)
+                yield from self._request(number + 1, cycle, now_us + patience_us)
+        else:
+            late_us = self.random.uniform(0, node.group.worst_extra_us)
+            late_us += self.emulation.faults.get(SLOW_NODE.name, 0.0) * self._is_hit(SLOW_NODE, number, cycle)
+            queued_us = now_us + node.answers_us + late_us
+            yield from self._sent(node.answers, "feedback", number, cycle, queued_us)
+            if self._is_hit(DOUBLE, number, cycle):
+                yield from (self._at(queued_us, answer, cycle) for answer in node.answers)
 
 
 def _period_us(network: Network) -> float:

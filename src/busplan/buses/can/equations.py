@@ -15,6 +15,8 @@ LEAST_BIT_RATE, MOST_BIT_RATE = 5, 1000
 """Bit rates of transceivers and of the standard, any between them [kbit/s]."""
 DATA_BIT_RATES: Final = (1000, 2000, 4000, 5000, 8000)
 """Data bit rates that transceivers of CAN FD are made for, up to those of CiA 601-4 [kbit/s]."""
+USUAL_DATA_BIT_RATE: Final = 2000.0
+"""Data bit rate that is assumed where no file gives one [kbit/s]."""
 MOST_DATA_BIT_RATE: Final = DATA_BIT_RATES[-1]
 """Largest data bit rate of CAN FD [kbit/s]."""
 IdentifierBits = Literal[11, 29]

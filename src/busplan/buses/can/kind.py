@@ -20,7 +20,6 @@ from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting,
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
 from busplan.buses.waterfall import RecordedCycles
-from busplan.errors import BusplanError
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -58,7 +57,6 @@ def _identifier_bits(network: Network) -> Setting:
     return Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), values)
 
 
-_NO_SYNC: Final = 'bus.access = "{}" has none'
 _HOST_STEP_US: Final = 10.0
 _MOTORS: Final = """\
 [bus]
@@ -225,11 +223,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     ) -> Recorded:
         """Compare a CAN log with the plan."""
         from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
-
-        if network.groups and network.profile.bus.access != "sync":
-            raise BusplanError(
-                f"{path}: a log is compared by its SYNCs, and {_NO_SYNC.format(network.profile.bus.access)}"
-            )
 
         return recorded(network, path, share=share, channel=channel, progress=progress)
 

@@ -1,7 +1,6 @@
 """A CAN log beside the plan: the bit rate, the load, every cycle, and the period, bursts and data of every message."""
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, isfinite
 from pathlib import Path
@@ -10,10 +9,22 @@ from typing import Any, Final
 import numpy as np
 
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
-from busplan.buses.can.due import due_pdos
-from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us, c, frame_us
+from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us
+from busplan.buses.can.exchanges import RequestLog
+from busplan.buses.can.logged import wire_times
+from busplan.buses.can.recorded_cycles import (
+    EMERGENCY,
+    Ints,
+    Senders,
+    SentPdos,
+    emergencies,
+    joined,
+    last_pdos,
+    pdos_beside_sync,
+)
+from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC
+from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
 from busplan.english import first_of, plural
@@ -23,12 +34,11 @@ from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, lateness, periodic_events, quantile
 
-_NOT_SHOWN: Final = (
-    "A log does not show the bit rate, frames that the recorder missed, when a frame was queued, commands that are "
-    "always late by whole periods, or the nodes' own time."
-)
+_NOT_SHOWN: Final = "A log does not show the bit rate, frames that the recorder missed, when a frame was queued"
+_BESIDE_SYNC: Final = ", commands that are always late by whole periods, or the nodes' own time"
 _ROUNDING_US: Final = 1.0
 _CLASSICAL: Final = "classical CAN"
+_PERIOD: Final = "cycle.period_us"
 _TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 
 
@@ -40,7 +50,7 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     """
     frames = read_can(path, channel=channel, progress=progress)
     try:
-        log = Log(network, frames, share)
+        log = _Log(network, frames, share)
     except BusplanError as error:
         raise BusplanError(f"{path}: {error}") from None
     day = day_of(int(frames.start_s * 1e9))
@@ -48,7 +58,7 @@ def recorded(network: Network, path: Path, *, share: float, channel: str | None,
     return compared.unless_synthetic(frames.synthetic)
 
 
-class Log:
+class _Log:
     """A log beside the plan."""
 
     def __init__(self, network: Network, frames: CanFrames, share: float) -> None:
@@ -62,19 +72,14 @@ class Log:
         self.by_identifier = can_timing.frames_by_identifier(frames, self.stretch)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
+        self.senders = Senders(network, streams(self.traffic))
+        self.pdos: list[SentPdos] = []
+        """PDOs beside their SYNCs, by identifier; none before they were compared."""
         self.messages = {message.name: message for message in network.profile.message}
         self.least_bit_rate = can_timing.least_bit_rate(frames, self.stretch)
         self.step_us = can_timing.step_us(self.stretch)
-        self.stamp_error_us = self.step_us + self._late_stamps_us()
+        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(frames, self.stretch, self.bit_us)
         """Largest error of a stamp: the step of stamps, and what frames come closer than the bus allows [us]."""
-
-    def _late_stamps_us(self) -> float:
-        """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us]."""
-        sent_us = np.concatenate(([0.0], self.frames.bits[self.taken].cumsum() * self.bit_us))
-        ahead_us = [wire_us - self.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
-        late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
-        # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
-        return late_us + float(self.frames.bits.max()) * self.bit_us if late_us > self.step_us else late_us
 
     @property
     def has_switch(self) -> bool:
@@ -94,24 +99,28 @@ class Log:
                 "at most",
                 len(self.taken),
                 "bus.bit_rate_kbit_s",
-            )
+            ).located(self.frames.events(least.rates, self.taken))
         yield from self._load()
-        yield self._missed("error frames", self.frames.errors, len(self.times_us) + self.frames.errors)
-        sent = streams(self.traffic)
+        errors = self._missed("error frames", self.frames.errors, len(self.times_us) + self.frames.errors)
+        yield errors.located(self.frames.error_events())
+        sent = self.senders.sent
+        yield from self._emergencies()
         yield from self._cycles(sent)
         responses = {(answer.group, answer.name): answer.phases for answer in self.cycle.latencies()}
         unstuffed = streams(replace(self.traffic, is_stuffed=False))
-        for stream, shortest, label in zip(sent, unstuffed, _labels(sent), strict=True):
+        for stream, shortest, label in zip(sent, unstuffed, self.senders.labels, strict=True):
             phases = responses.get((stream.group, stream.name))
             yield from self._stream(stream, label, self._spread_us(stream, shortest.frame_us, phases))
+            yield from self._response(stream, label, shortest.frame_us, phases or {})
         count = len(self.taken)
         if self.unseen:
             hidden = f"never in the log: {first_of(self.unseen, can_timing.LISTED)}"
             unseen = len(self.unseen)
             yield _limited("frames of the plan never in the log", 0, unseen, count, hidden=hidden)
-        frames = sum(len(sent.times_us) for sent in self.unplanned.values())
+        unplanned = joined(sent.frames for sent in self.unplanned.values())
         note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], can_timing.LISTED)
-        yield _limited("frames of no message of the plan", 0, frames, frames, note=note)
+        figure = _limited("frames of no message of the plan", 0, len(unplanned), len(unplanned), note=note)
+        yield self._located(figure, unplanned)
 
     def shows_nothing(self) -> Iterator[str]:
         """Reasons why the log as a whole shows no machine within its plan."""
@@ -125,28 +134,15 @@ class Log:
         if self.traffic.has_cycle and 2 * self.step_us > period_us:
             yield f"its stamps have steps of {self.step_us:,.0f} us, and a cycle lasts {period_us:,.0f}"
 
+    def _located(self, figure: RecordedFigure, frames: Ints, values: Floats | None = None) -> RecordedFigure:
+        """The figure with the moments of frames, by their values, or of frames that are counted."""
+        return figure.located(self.frames.events(np.ones(len(frames)) if values is None else values, frames))
+
     def _missed(
         self, quantity: str, number: int | None, events: int, *, note: str = "", hidden: str = ""
     ) -> RecordedFigure:
         most = self.network.profile.limits.missed_cycles
         return _limited(quantity, most, number, events, "limits.missed_cycles", note=note, hidden=hidden)
-
-    def wire_us(self, *, is_stuffed: bool) -> Floats:
-        """Time of each frame on the wire with the most stuff bits, or with none [us]."""
-        taken = self.taken
-        us = np.zeros(len(taken))
-        nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
-        is_fd, switched = self.frames.is_fd[taken], self.frames.switched[taken]
-        # Without a data bit rate the frames that switch take no time.
-        for places, data_rate in ((~is_fd, 0.0), (is_fd & ~switched, nominal), (is_fd & switched & bool(data), data)):
-            us[places] = frame_us(
-                np.minimum(self.frames.sizes[taken[places]], c.FD_FRAME_BYTES if data_rate else c.FRAME_BYTES),
-                identifier_bits=np.where(self.frames.extended[taken[places]], 29, BASE_BITS),
-                bit_rate_kbit_s=nominal,
-                data_bit_rate_kbit_s=data_rate,
-                is_stuffed=is_stuffed,
-            )
-        return us
 
     def _load(self) -> Iterator[RecordedFigure]:
         """Mean load and that of the fullest second, the planned load, and the frames with the most stuff bits and none.
@@ -158,9 +154,10 @@ class Log:
         is_whole = self.has_switch or not self.frames.switched[self.taken].any()
         if count < 2 or span_us <= 0 or (is_fd.all() and not is_whole):  # noqa: PLR2004 - a distance
             return
-        worst_us, none_us = self.wire_us(is_stuffed=True), self.wire_us(is_stuffed=False)
-        # Of CAN FD the stuff bits are not known: any number of the possible ones.
-        wire_us = np.where(is_fd, (worst_us + none_us) / 2, self.frames.bits[self.taken] * self.bit_us)
+        nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
+        wire_us, worst_us, none_us = wire_times(
+            self.frames, self.taken, bit_rate_kbit_s=nominal, data_bit_rate_kbit_s=data
+        )
         # The first frame ended with its stamp.
         load, worst, none = (float(us[1:].sum()) / span_us for us in (wire_us, worst_us, none_us))
         # A log begins and ends anywhere: it may have a frame more of each identifier than its length has periods.
@@ -175,8 +172,9 @@ class Log:
         else:
             note = f"{note}; without frames of CAN FD that switch"
             yield RecordedFigure("load", "share", planned, load, None, "shown", count, note=note)
-        fullest = can_timing.fullest_load(self.times_us, wire_us)
-        yield RecordedFigure("load, fullest second", "share", planned, fullest, None, "shown", count)
+        loads = can_timing.second_loads(self.times_us, wire_us)
+        fullest = RecordedFigure("load, fullest second", "share", planned, float(loads.max()), None, "shown", count)
+        yield self._located(fullest, self.taken[: len(loads)], loads)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
         classical, possible_us = ~is_fd, float((worst_us - none_us)[~is_fd].sum())
@@ -186,9 +184,10 @@ class Log:
 
     def _cycles(self, sent_streams: Sequence[Stream]) -> Iterator[RecordedFigure]:
         """SYNCs and PDOs that are missing, and the last PDO after its SYNC."""
-        if not self.traffic.has_cycle:
+        if not self.traffic.has_sync:
+            yield from self._requests()
             return
-        sync, *others = sent_streams
+        sync = sent_streams[0]
         is_extended = sync.identifier_bits > BASE_BITS
         sent = self.by_identifier.get((sync.first, is_extended))
         periods = None if sent is None else periodic_events(sent.times_us)
@@ -196,39 +195,139 @@ class Log:
             few = f"SYNC comes {plural(0 if sent is None else len(sent.times_us), 'time')}"
             yield self._missed("cycles without SYNC", None, 0, hidden=few)
             return
-        yield self._missed("cycles without SYNC", periods.missing, int(periods.places[-1]) + 1)
-        cycles = np.arange(periods.places[-1] + 1)
-        sync_us, is_sent = np.interp(cycles, periods.places, sent.times_us), np.isin(cycles, periods.places)
-        behind_us = np.full(len(cycles), -np.inf)
-        lost: dict[str, list[str]] = {"missing": [], "twice": []}
-        counts = Counter[str]()
-        for stream in others:
-            for identifier in () if stream.is_message else range(stream.first, stream.last + 1):
-                sent = self.by_identifier.get((identifier, is_extended))
-                times_us = np.zeros(0) if sent is None else sent.times_us
-                every = round(stream.period_us / sync.period_us)
-                pdos = due_pdos(sync_us, times_us, every=every, is_sent=is_sent)
-                np.maximum.at(behind_us, pdos.cycles, pdos.late_us)
-                counts.update(due=pdos.due, missing=pdos.missing, twice=pdos.twice)
-                for name, notes in lost.items():
-                    if number := getattr(pdos, name):
-                        notes.append(f"{number:,} of {identifier:#x}")
-        for name, notes in lost.items():
-            yield self._missed(f"PDOs {name}", counts[name], counts["due"], note=first_of(notes, can_timing.LISTED))
-        behind_us = behind_us[behind_us >= 0]
-        if len(behind_us):
-            behind = quantile(behind_us, self.share)
-            yield RecordedFigure(
+        figure = self._missed("cycles without SYNC", periods.missing, int(periods.places[-1]) + 1)
+        before, without = periods.gaps
+        yield self._located(figure, sent.frames[before], without)
+        self.pdos += pdos_beside_sync(sent, periods, sync.period_us, self.senders, self.by_identifier)
+        due = sum(pdos.due for pdos in self.pdos)
+        for name in ("missing", "twice"):
+            lost = {pdos.name: getattr(pdos, name) for pdos in self.pdos}
+            notes = [f"{len(frames):,} of {name}" for name, frames in lost.items() if len(frames)]
+            frames = joined(lost.values())
+            figure = self._missed(f"PDOs {name}", len(frames), due, note=first_of(notes, can_timing.LISTED))
+            # Several may be missing at one SYNC.
+            frames, number = np.unique(frames, return_counts=True)
+            yield self._located(figure, frames, number.astype(np.float64))
+        late_us, frames = last_pdos(self.pdos)
+        if len(late_us):
+            behind = quantile(late_us, self.share)
+            figure = RecordedFigure(
                 "last PDO after SYNC",
                 "us",
                 # From a SYNC as it came, late or not.
-                _finite(self.cycle.required_us - self.network.nonperiodic_us - self.traffic.sync_jitter_us),
+                _finite(self._last_us),
                 behind.value,
                 self._with_stamps(*(doubt.us for doubt in self.cycle.doubts()), behind.uncertainty or 0.0),
                 "at most",
-                len(behind_us),
-                "cycle.period_us",
+                len(late_us),
+                _PERIOD,
+                self._latest(self.pdos),
             )
+            yield self._located(figure, frames, late_us)
+
+    @property
+    def _last_us(self) -> float:
+        """Time that a cycle takes from SYNC on, by the plan [us]."""
+        return float(self.cycle.required_us - self.network.nonperiodic_us - self.traffic.sync_jitter_us)
+
+    @staticmethod
+    def _latest(some: Iterable[SentPdos]) -> str:
+        """The PDO that comes latest after its SYNC, by its name with the node, as a note."""
+        latest = max((pdos for pdos in some if len(pdos.late_us)), key=lambda pdos: float(pdos.late_us.max()))
+        return f"the latest: {latest.name}"
+
+    def _emergencies(self) -> Iterator[RecordedFigure]:
+        """Emergencies of nodes, where a network of CANopen has any."""
+        if not self.traffic.has_sync or self.senders.sent[0].first != EMERGENCY:
+            return
+        cyclic = {identifier for _, identifier in self.senders.pdos()}
+        others = (sent.frames for sent in self.by_identifier.values() if sent.identifier not in cyclic)
+        found = emergencies(self.frames, joined(others))
+        if not len(found.frames):
+            return
+        for identifier in np.unique(self.frames.identifiers[found.frames]).tolist():
+            self.unplanned.pop((identifier, False), None)
+        is_error = found.codes != 0
+        notes = []
+        for node, code, register in sorted({*zip(*(part.tolist() for part in found[1:]), strict=True)}):
+            alike = (found.nodes == node) & (found.codes == code) & (found.registers == register)
+            events = self.frames.events(np.ones(int(alike.sum())), found.frames[alike])
+            at_s, frame = events.earliest(events.values > 0)
+            times = f", {plural(len(events.values), 'time')}, first" if len(events.values) > 1 else ""
+            words = f"error {code:#06x}, register {register:#04x}" if code else "no error any more"
+            name = self.senders.by_node_id.get(node, f"node-ID {node}")
+            notes.append((frame, f"{name}: {words}{times} at {at_s:.6f} s, frame {frame}"))
+        note = first_of([words for _, words in sorted(notes)], can_timing.LISTED)
+        figure = self._missed("emergencies", int(is_error.sum()), len(found.frames), note=note)
+        yield self._located(figure, found.frames[is_error])
+
+    def _response(
+        self, stream: Stream, label: str, shortest_us: float, phases: Mapping[str, Any]
+    ) -> Iterator[RecordedFigure]:
+        """Response of a PDO after its SYNC; of a message, what its arrivals show of it."""
+        quantity = f"{label}: response"
+        if stream.is_message:
+            yield from self._message_response(stream, quantity, shortest_us, phases)
+            return
+        sent = [pdos for pdos in self.pdos if pdos.stream == stream and len(pdos.late_us)]
+        if not sent:
+            return
+        group = next(group for group in self.network.groups if group.name == stream.group)
+        if stream.name == NAMES["read"]:
+            planned_us = group.read_execution_us + group.worst_extra_us + phases["worst_response_us"]
+            key, doubts = group.key("execution"), (group.read_uncertainty_us,)
+        else:
+            # Behind the last command only the slowest execution follows.
+            slowest_us = max(group.write_execution_us + group.worst_extra_us for group in self.network.groups)
+            planned_us = self._last_us - slowest_us
+            key, doubts = _PERIOD, tuple(doubt.us for doubt in self.cycle.doubts())
+        late_us = joined(pdos.late_us for pdos in sent)
+        latest = quantile(late_us, self.share)
+        figure = RecordedFigure(
+            quantity,
+            "us",
+            _finite(planned_us),
+            latest.value,
+            self._with_stamps(*doubts, latest.uncertainty or 0.0),
+            "at most" if isfinite(planned_us) else "shown",
+            len(late_us),
+            key,
+            self._latest(sent),
+        )
+        yield self._located(figure, joined(pdos.frames for pdos in sent), late_us)
+
+    def _message_response(
+        self, stream: Stream, quantity: str, shortest_us: float, phases: Mapping[str, Any]
+    ) -> Iterator[RecordedFigure]:
+        """The latest arrival of a periodic message behind its earliest, which took its shortest frame or longer."""
+        sent = [
+            (sent, lateness(sent.periods, self.share))
+            for identifier in range(stream.first, stream.last + 1)
+            if (sent := self.by_identifier.get((identifier, stream.identifier_bits > BASE_BITS))) and sent.periods
+        ]
+        if not sent or "worst_response_us" not in phases:
+            return
+        latest, late = max(sent, key=lambda pair: pair[1].value)
+        planned_us, count = _finite(phases["worst_response_us"]), len(latest.times_us)
+        note = self.senders.name(stream, latest.identifier) if len(sent) > 1 else ""
+        figure = RecordedFigure(quantity, "us", planned_us, late.value + shortest_us, None, "shown", count, note=note)
+        yield self._located(figure, latest.frames, late.late_us)
+
+    def _requests(self) -> Iterator[RecordedFigure]:
+        """Requests and answers of a cycle without SYNC."""
+        if not isinstance(self.cycle, RequestCycle):
+            return
+        log = RequestLog(
+            self.cycle,
+            self.frames,
+            self.stretch,
+            self.by_identifier,
+            senders=self.senders,
+            share=self.share,
+            stamp_error_us=self.stamp_error_us,
+        )
+        yield from log.figures(self._missed)
+        self.edits |= log.edits
 
     def _with_stamps(self, *uncertainties: float) -> float | None:
         """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""
@@ -239,12 +338,12 @@ class Log:
         """Period, jitter, data and format of a message or of SYNC; data and format of a PDO."""
         is_extended = stream.identifier_bits > BASE_BITS
         identifiers = range(stream.first, stream.last + 1)
-        sent_frames = [self.by_identifier.get((identifier, is_extended)) for identifier in identifiers]
-        recorded = [sent for sent in sent_frames if sent is not None]
+        found = {identifier: self.by_identifier.get((identifier, is_extended)) for identifier in identifiers}
+        recorded = [sent for sent in found.values() if sent is not None]
         for sent in recorded:
             self.unplanned.pop((sent.identifier, is_extended), None)
-        if missing := len(sent_frames) - len(recorded):
-            self.unseen.append(f"{missing} of {label}" if recorded else label)
+        missing = [self.senders.name(stream, identifier) for identifier, sent in found.items() if sent is None]
+        self.unseen += missing if recorded else [label]
         if not recorded:
             return
         message = self.messages[stream.name] if stream.is_message else None
@@ -261,18 +360,21 @@ class Log:
         if message and most_bytes > planned_bytes:
             self.edits[f"{key}.payload_bytes"] = most_bytes
         bytes_key = key and f"{key}.payload_bytes"
-        yield RecordedFigure(f"{label}: data", "bytes", planned_bytes, most_bytes, None, "at most", count, bytes_key)
-        formats = [(_format(sent.is_fd, sent.switches), len(sent.times_us)) for sent in recorded]
+        data = RecordedFigure(f"{label}: data", "bytes", planned_bytes, most_bytes, None, "at most", count, bytes_key)
+        all_frames = joined(sent.frames for sent in recorded)
+        yield self._located(data, all_frames, self.frames.sizes[all_frames].astype(np.float64))
+        formats = [(_format(sent.is_fd, sent.switches), sent.frames) for sent in recorded]
         unlike = [(name, frames) for name, frames in formats if name != planned]
         if unlike:
             note = f"{unlike[0][0]} recorded, {planned} planned"
-            frames = sum(frames for _, frames in unlike)
-            yield _limited(f"{label}: frames of another format", 0, frames, count, key, note=note)
+            frames = joined(frames for _, frames in unlike)
+            figure = _limited(f"{label}: frames of another format", 0, len(frames), count, key, note=note)
+            yield self._located(figure, frames)
 
     def _sync(self, stream: Stream, sent: can_timing.SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
         """Period of SYNC, equal to that of the plan, and its jitter."""
         periods, planned_us, count = periodic_events(sent.times_us), stream.period_us, len(sent.times_us)
-        period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, "cycle.period_us")
+        period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, _PERIOD)
         if periods is None:
             yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
             return
@@ -285,6 +387,7 @@ class Log:
             quantity = "SYNC: jitter of the arrival"
             key = "bus.sync_jitter_us"
             jitter = RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count, key)
+            jitter = self._located(jitter, sent.frames, late.late_us)
             of_host = f"{key}, " if self.traffic.sync_jitter_us else ""
             yield jitter._replace(note=f"planned: {of_host}the wait for other frames and stuff bits")
             if jitter.verdict == "outside":
@@ -301,7 +404,7 @@ class Log:
             return
 
         def identifier(sent: can_timing.SentFrames) -> str:
-            return f"{sent.identifier:#x}" if len(recorded) > 1 else ""
+            return self.senders.name(stream, sent.identifier) if len(recorded) > 1 else ""
 
         often = min(repeated, key=lambda sent: sent.mean.value)
         count, mean = len(often.times_us), often.mean
@@ -345,7 +448,7 @@ class Log:
             f"{key}.jitter_us",
             identifier(sent),
         )
-        yield jitter
+        yield self._located(jitter, sent.frames, ahead(sent.times_us, least_us))
         if jitter.verdict == "outside":
             model = can_timing.event_model(
                 sent.times_us, planned_us, stamp_error_us=self.stamp_error_us, tolerance=float(CLOCK_TOLERANCE)
@@ -380,7 +483,7 @@ class Log:
             yield f"Frames come up to {late_us:.0f} us closer than the bus allows: stamps are late, and U holds it."
         if self.step_us > 1:
             yield f"Stamps have steps of {self.step_us:g} us."
-        yield _NOT_SHOWN
+        yield f"{_NOT_SHOWN}{_BESIDE_SYNC if self.traffic.has_sync else ''}."
 
 
 def _limited(
@@ -399,15 +502,6 @@ def _format(is_fd: bool, switches: bool) -> str:
     if not is_fd:
         return _CLASSICAL
     return "CAN FD" if switches else "CAN FD without a switch of bit rate"
-
-
-def _labels(sent: Sequence[Stream]) -> list[str]:
-    """Name of each stream; those of a PDO with several frames are numbered."""
-    labels = [stream.label for stream in sent]
-    return [
-        f"{label} {labels[: place + 1].count(label)}" if labels.count(label) > 1 else label
-        for place, label in enumerate(labels)
-    ]
 
 
 def _finite(us: float) -> float | None:

@@ -5,11 +5,12 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
-from busplan.buses.can.equations import BASE_BITS
-from busplan.buses.can.recorded import Log
+from busplan.buses.can.equations import BASE_BITS, bit_us
+from busplan.buses.can.logged import wire_times
+from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, Senders, emergencies
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC, answer_us
 from busplan.buses.network import Network, numbers_by_due
@@ -26,13 +27,12 @@ from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings import can_timing
-from busplan.recordings.can import read_can
+from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.statistics import Floats, periodic_events
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-Ints = npt.NDArray[np.int64]
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 _OTHERS: Final = ("blocking", "message", "repeated")
 """Kinds of planned events that are of other traffic."""
@@ -62,7 +62,7 @@ def recorded_cycles(network: Network, path: "Path", *, channel: str | None, prog
     """The whole cycles of a CAN log; BusplanError for one without."""
     frames = read_can(path, channel=channel, progress=progress)
     try:
-        return _CanCycles(network, Log(network, frames, share=1.0))
+        return _CanCycles(network, frames)
     except BusplanError as error:
         raise BusplanError(f"{path}: {error}") from None
 
@@ -70,22 +70,33 @@ def recorded_cycles(network: Network, path: "Path", *, channel: str | None, prog
 class _CanCycles(RecordedCycles):
     """Cycles from SYNC to SYNC, or from one first request to the next."""
 
-    def __init__(self, network: Network, log: Log) -> None:
-        self.network, self.log, self.synthetic = network, log, log.frames.synthetic
-        rate = log.traffic.bit_rate_kbit_s
-        if log.least_bit_rate.surely > rate:
-            needed = f"its frames need {log.least_bit_rate.surely:,.0f} kbit/s"
-            raise BusplanError(f"{needed}, and bus.bit_rate_kbit_s = {rate:g}: they do not fit on the wire of the plan")
-        longest_us, shortest_us = (log.wire_us(is_stuffed=is_stuffed) for is_stuffed in (True, False))
-        is_fd = log.frames.is_fd[log.taken]
-        # Of CAN FD the stuff bits are not known.
-        self.wire_us = np.where(is_fd, (longest_us + shortest_us) / 2, log.frames.bits[log.taken] * log.bit_us)
-        self.wire_doubt_us = np.where(is_fd, (longest_us - shortest_us) / 2, 0.0)
+    def __init__(self, network: Network, frames: CanFrames) -> None:
+        self.network, self.frames, self.synthetic = network, frames, frames.synthetic
+        self.cycle = can_cycle(network, WORST_STUFFING)
+        traffic = self.traffic = self.cycle.traffic
+        stretch = can_timing.longest_stretch(frames)
+        self.taken = stretch.taken
+        needed, rate = can_timing.least_bit_rate(frames, stretch).surely, traffic.bit_rate_kbit_s
+        if needed > rate:
+            raise BusplanError(
+                f"its frames need {needed:,.0f} kbit/s, and bus.bit_rate_kbit_s = {rate:g}: they do not fit on the wire "
+                "of the plan"
+            )
+        self.step_us = can_timing.step_us(stretch)
+        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(frames, stretch, bit_us(rate))
+        wire = wire_times(
+            frames, stretch.taken, bit_rate_kbit_s=rate, data_bit_rate_kbit_s=traffic.data_bit_rate_kbit_s
+        )
+        self.wire_us = wire.us
+        self.stuffing_us = np.where(frames.is_fd[stretch.taken], (wire.worst_us - wire.none_us) / 2, 0.0)
         # A frame ends before the next one begins: a stamp beyond that is late. Of the time since 1970 a float holds
         # whole microseconds.
         sent_us = self.wire_us.cumsum()
-        self.ends_us: Floats = np.minimum.accumulate((np.rint(log.times_us) - sent_us)[::-1])[::-1] + sent_us
-        self.key = log.frames.identifiers[log.taken] * 2 + log.frames.extended[log.taken]
+        self.ends_us: Floats = np.minimum.accumulate((np.rint(stretch.times_us) - sent_us)[::-1])[::-1] + sent_us
+        self.begin_us = float(stretch.times_us[0]) - frames.lead_us
+        """Time of the first frame of the recording [us]."""
+        self.key = frames.identifiers[stretch.taken] * 2 + frames.extended[stretch.taken]
+        self.names = Senders(network, streams(traffic))
         self.senders = dict(self._senders())
         self.places = {key: np.flatnonzero(self.key == key) for key in self.senders}
         self.anchor = self._anchor()
@@ -100,42 +111,36 @@ class _CanCycles(RecordedCycles):
 
     def _senders(self) -> Iterator[tuple[int, _Sender]]:
         """Senders by key of their identifier: of all PDOs of the plan, and of all frames of the log."""
-        sent = streams(self.log.traffic)
-        keys = self.key
+        sent, keys = self.names.sent, self.key
         for stream in sent:
             if not stream.is_message:
                 cyclic = np.arange(int(stream.first), int(stream.last) + 1) * 2 + (stream.identifier_bits > BASE_BITS)
                 keys = np.union1d(keys, cyclic)
         for key in np.unique(keys).tolist():
             identifier, is_extended = divmod(key, 2)
-            of_plan = (
+            of_plan = [
                 stream
                 for stream in sent
                 if (stream.identifier_bits > BASE_BITS) == is_extended and stream.first <= identifier <= stream.last
-            )
-            stream = next(of_plan, None)
+            ]
             unplanned = _Sender("", f"{identifier:#x}, no message of the plan")
-            yield key, unplanned if stream is None else self._of_stream(stream, identifier)
+            yield key, self._of_stream(of_plan[0], identifier) if of_plan else unplanned
 
     def _of_stream(self, stream: Stream, identifier: int) -> _Sender:
+        label, frame_us = self.names.name(stream, identifier), float(stream.frame_us)
         if stream.is_message or stream.name == SYNC:
-            kind = "message " if stream.is_message else ""
-            return _Sender(stream.name, f"{kind}{stream.name} {identifier:#x}", frame_us=float(stream.frame_us))
-        group = next(group for group in self.network.groups if group.name == stream.group)
-        number = (identifier - int(stream.first)) // max(round(stream.identifiers / group.nodes), 1)
-        names = [
-            f"{member.name or 'node'} {own}" for member in group.members for own in range(1, int(member.nodes) + 1)
-        ]
-        node, traffic = names[min(number, len(names) - 1)], self.log.traffic
+            return _Sender(stream.name, label, frame_us=frame_us)
+        group, nodes = next(group for group in self.network.groups if group.name == stream.group), self.names.nodes
+        number = (identifier - int(stream.first)) // max(int(stream.identifiers) // len(nodes[stream.group]), 1)
         ready_us = group.read_execution_us + group.worst_extra_us
-        if not traffic.has_sync:
+        if not self.traffic.has_sync:
             ready_us = answer_us([group], access="burst")
-        label, every = f"{stream.name} {identifier:#x} of {node}", round(stream.period_us / traffic.period_us)
-        return _Sender(stream.name, label, node, float(ready_us), float(stream.frame_us), max(every, 1))
+        every = max(round(stream.period_us / self.traffic.period_us), 1)
+        return _Sender(stream.name, label, nodes[stream.group][number], float(ready_us), frame_us, every)
 
     def _anchor(self) -> int:
         """Key of the identifier that begins a cycle: SYNC, or of the most frequent requests that behind a pause."""
-        role = SYNC if self.log.traffic.has_sync else _COMMAND
+        role = SYNC if self.traffic.has_sync else _COMMAND
         keys = [key for key, sender in self.senders.items() if sender.role == role and len(self.places[key]) > 1]
         if not keys:
             what = "SYNC" if role == SYNC else "request of any node"
@@ -154,7 +159,7 @@ class _CanCycles(RecordedCycles):
     def _aligned(self) -> tuple[Ints, Ints]:
         """Cycle of each frame, -1 for one that is of none, and the cycles that are whole."""
         begins = self.places[self.anchor]
-        begin_us = self.log.times_us[begins]
+        begin_us = self.ends_us[begins]
         periods = periodic_events(begin_us)
         at = np.arange(len(begins)) if periods is None else periods.places
         numbers = np.arange(int(at[-1]) + 1)
@@ -163,15 +168,15 @@ class _CanCycles(RecordedCycles):
         for key, sender in self.senders.items():
             if sender.role in (_FEEDBACK, _COMMAND) and key != self.anchor:
                 places = self.places[key]
-                due = due_pdos(sync_us, self.log.times_us[places], every=sender.every, is_sent=is_sent)
-                cycle_of[places[len(places) - len(due.cycles) :]] = due.cycles
+                due = due_pdos(sync_us, self.ends_us[places], every=sender.every, is_sent=is_sent)
+                cycle_of[places[due.pdos]] = due.cycles
         cycle_of[begins] = at
         # The log may end within the last one.
         return cycle_of, at[:-1]
 
     def waterfall(self, place: int) -> Waterfall:
         """Events of a cycle."""
-        cycle, log = int(self.cycles[place]), self.log
+        cycle = int(self.cycles[place])
         first, last = int(self.first[cycle]), int(self.last[cycle])
         start_us = float(self.ends_us[first] - self.wire_us[first])
         events = tuple(
@@ -180,17 +185,17 @@ class _CanCycles(RecordedCycles):
         )
         return Waterfall(
             self.numbers[place],
-            (start_us - float(log.times_us[0])) / 1e6,
+            (start_us - self.begin_us) / 1e6,
             self.number_of(first),
             events,
             self._planned(cycle),
-            self._doubts_us(events, float(self.wire_doubt_us[first : last + 1].sum())),
+            self._doubts_us(events, float(self.stuffing_us[first : last + 1].sum())),
             tuple(self._remarks(cycle)),
         )
 
     def number_of(self, place: int) -> int:
         """Number of a frame in the log."""
-        return int(self.log.frames.numbers[self.log.taken[place]])
+        return int(self.frames.numbers[self.taken[place]])
 
     def _events(self, cycle: int, first: int, last: int) -> Iterator[WaterfallEvent]:
         """Frames and waits of a cycle, at the times of the log [us]."""
@@ -225,9 +230,9 @@ class _CanCycles(RecordedCycles):
 
     def _destroyed(self, from_us: float, to_us: float) -> list[WaterfallEvent]:
         """Time between two frames up to the last error frame there: how much of it is on the wire is not known."""
-        frames = self.log.frames
+        frames = self.frames
         errors_us = np.rint(frames.errors_us)
-        inside = np.flatnonzero((errors_us > from_us) & (errors_us <= to_us + self.log.stamp_error_us))
+        inside = np.flatnonzero((errors_us > from_us) & (errors_us <= to_us + self.stamp_error_us))
         if not len(inside):
             return []
         number, end_us = int(frames.error_numbers[inside[-1]]), min(float(errors_us[inside[-1]]), to_us)
@@ -251,18 +256,18 @@ class _CanCycles(RecordedCycles):
         doubts_us: dict[Awaited, float] = {"wire": stuffing_us, "others": stuffing_us}
         waited = [event.waits_for for event in events if event.waits_for not in doubts_us]
         for awaited, _ in groupby(waited):
-            doubts_us[awaited] = doubts_us.get(awaited, stuffing_us) + self.log.stamp_error_us
+            doubts_us[awaited] = doubts_us.get(awaited, stuffing_us) + self.stamp_error_us
         return doubts_us
 
     def _planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
         """The planned cycle with the groups that are seen, from its first frame to its last one."""
-        rates, here = self.log.cycle.rates, np.flatnonzero(self.cycle_of == cycle).tolist()
+        rates, here = self.cycle.rates, np.flatnonzero(self.cycle_of == cycle).tolist()
         nodes = {self.senders[int(self.key[place])].node for place in here}
         names, ends = node_names(self.network), np.cumsum([int(group.nodes) for group in self.network.groups])
         is_seen = [not nodes.isdisjoint(part) for part in (names[a:b] for a, b in zip((0, *ends), ends, strict=False))]
         numbers = {due: found[0] for due, found in numbers_by_due(rates).items()}
         due = min(numbers, key=lambda due: sum(a != b for a, b in zip(due, is_seen, strict=True)))
-        planned = self.log.cycle.at(numbers[due]) if len(numbers) > 1 else self.log.cycle
+        planned = self.cycle.at(numbers[due]) if len(numbers) > 1 else self.cycle
         events = [*planned_events(planned.events(), planned.term_figures, others=_OTHERS, names=names)]
         frames = [place for place, (kind, _) in enumerate(events) if kind in _FRAMES]
         return from_zero(event for _, event in events[frames[0] : frames[-1] + 1]) if frames else ()
@@ -271,17 +276,16 @@ class _CanCycles(RecordedCycles):
         missing = [self.senders[key].label for role in (_FEEDBACK, _COMMAND) for key in self.missing(cycle, role)]
         if missing:
             yield f"Never came in this cycle: {first_of(missing, can_timing.LISTED)}."
-        log = self.log
         yield (
-            f"Frames have their length at {log.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these have "
-            f"an error of up to {log.stamp_error_us:g} us."
+            f"Frames have their length at {self.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these have "
+            f"an error of up to {self.stamp_error_us:g} us."
         )
-        if log.stamp_error_us > log.step_us + _STAMP_US:
+        if self.stamp_error_us > self.step_us + _STAMP_US:
             yield "Frames come closer than the bus allows: stamps are late."
         yield (
             "From the first frame to the last: of the plan SYNC's jitter, the frame that SYNC waits for, and what "
             "comes behind the last frame are left out."
-            if log.traffic.has_sync
+            if self.traffic.has_sync
             else "From the first request to the last answer: the host's time before the first request is left out."
         )
 
@@ -290,8 +294,8 @@ class _Waits:
     """Waits of a cycle while its frames are gone through."""
 
     def __init__(self, cycles: _CanCycles, cycle: int, first: int) -> None:
-        self.cycles, self.has_sync = cycles, cycles.log.traffic.has_sync
-        self.is_burst, bus = cycles.log.traffic.access == "burst", cycles.network.profile.bus
+        self.cycles, self.has_sync = cycles, cycles.traffic.has_sync
+        self.is_burst, bus = cycles.traffic.access == "burst", cycles.network.profile.bus
         self.host_us = float(bus.host_us)
         self.waits_for_all = self.has_sync and not bus.pipeline_cycles
         self.left = set(np.flatnonzero(cycles.cycle_of == cycle).tolist())

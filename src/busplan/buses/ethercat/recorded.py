@@ -209,29 +209,31 @@ class Seen:
         is_hidden = self.stamp_us > max(jitter_us, latest.value)
         if not (is_hidden or self.bad_stamps):
             self.jitter = latest
-        yield start._replace(
+        start = start._replace(
             recorded=latest.value,
             uncertainty=expanded(latest.uncertainty, self.stamp_us * _TWO_STAMPS),
             hidden=f"stamps have steps of {self.stamp_us:g} us" if is_hidden else "",
         )
+        yield start.located(self.frames.events(latest.late_us, cycles.first))
 
     def _cycles(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
         """Figures of missing cycles, then of the times and layout of each kind of cycle."""
         per_cycle = self._values(cycles)
         if cycles.periods is None:
-            yield from self._times(cycles.sorts[0], "", per_cycle.trips_us, (per_cycle.host_us,))
+            everywhere = np.arange(len(cycles.first))
+            yield from self._times(cycles.sorts[0], "", cycles, per_cycle, (everywhere, everywhere))
             return
         frames, data_bytes = (_usual(values, cycles.sort) for values in (per_cycle.frames, per_cycle.data_bytes))
         has_less = (per_cycle.frames < frames) | (per_cycle.data_bytes < data_bytes)
-        yield self._without_frame(cycles, int(np.count_nonzero(has_less)))
+        yield self._without_frame(cycles, np.flatnonzero(has_less))
         whole = per_cycle.is_back & (per_cycle.frames == frames) & (per_cycle.data_bytes == data_bytes)
         for index, sort in enumerate(cycles.sorts):
             names = [group.name for group, is_due in zip(self.network.groups, sort.due, strict=True) if is_due]
             with_names = f" with {' and '.join(names) or 'no group'}" if has_rates(self.network) else ""
             of_sort = np.flatnonzero(whole & (cycles.sort == index))
             if sort.data_bytes:
-                host_us = () if index else (per_cycle.host_us[of_sort], per_cycle.host_us[whole])
-                yield from self._times(sort, with_names, per_cycle.trips_us[of_sort], host_us)
+                of_master = () if index else (of_sort, np.flatnonzero(whole))
+                yield from self._times(sort, with_names, cycles, per_cycle, (of_sort, *of_master))
             yield from self._layout(sort, with_names, cycles, of_sort, per_cycle)
 
     def _values(self, cycles: SeenCycles) -> _CycleValues:
@@ -253,8 +255,11 @@ class Seen:
         host_us = trips_us - wire_us - data_bytes * c.BYTE_BIAS_US - way_us
         return _CycleValues(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
 
-    def _without_frame(self, cycles: SeenCycles, with_less: int) -> RecordedFigure:
-        """Figure of cycles without a frame, or with less in their frames than most cycles of their kind."""
+    def _without_frame(self, cycles: SeenCycles, with_less: Ints) -> RecordedFigure:
+        """Figure of cycles without a frame, or with less in their frames than most cycles of their kind.
+
+        Those without a frame are at the cycle before them.
+        """
         longest, missing = int(cycles.gaps.max(initial=0)), int(cycles.gaps.sum())
         notes = []
         if longest > 1:
@@ -262,10 +267,14 @@ class Seen:
             first, end = cycles.first[at : at + 2]
             pause_us = (self.frames.times_ns[end] - self.frames.times_ns[first]) / 1000
             notes.append(f"{longest:,} in a row, {pause_us / 1e6:.3g} s without set-points")
-        if with_less:
-            notes.append(f"{with_less:,} with less than most have")
+        if len(with_less):
+            notes.append(f"{len(with_less):,} with less than most have")
         events = missing + len(cycles.first)
-        return self._missed("cycles without a frame", missing + with_less, events, ", ".join(notes), self._dropped)
+        number, before = missing + len(with_less), np.flatnonzero(cycles.gaps)
+        figure = self._missed("cycles without a frame", number, events, ", ".join(notes), self._dropped)
+        places = cycles.first[np.concatenate((before, with_less))]
+        each = np.concatenate((cycles.gaps[before], np.ones(len(with_less))))
+        return figure.located(self.frames.events(each, places))
 
     def _missed(self, quantity: str, number: int, events: int, note: str, hides: str = "") -> RecordedFigure:
         """A count held against `limits.missed_cycles`; hidden where dropped packets may explain the excess."""
@@ -273,11 +282,20 @@ class Seen:
         hidden = hides if number - self.dropped <= limit else ""
         return RecordedFigure(quantity, "1", limit, number, None, "at most", events, _MISSED, note, hidden=hidden)
 
+    def _counted(self, quantity: str, places: Ints, events: int, note: str, hides: str = "") -> RecordedFigure:
+        """A number of frames held against `limits.missed_cycles`."""
+        figure = self._missed(quantity, len(places), events, note, hides)
+        return figure.located(self.frames.events(np.ones(len(places)), places))
+
     def _times(
-        self, sort: UnitCycle, with_names: str, trips_us: Floats, host_us: tuple[Floats, ...]
+        self, sort: UnitCycle, with_names: str, cycles: SeenCycles, per_cycle: _CycleValues, places: tuple[Ints, ...]
     ) -> Iterator[RecordedFigure]:
-        """Round trip of a kind of cycle, and the master's time: the largest of the sets in `host_us`, if any."""
-        bus, count = self.network.profile.bus, len(trips_us)
+        """Round trip of a kind of cycle, and the master's time.
+
+        `places` are the cycles of the kind, and the sets of cycles of which the master's time is the largest, if any.
+        """
+        of_sort, *of_master = places
+        trips_us, bus, count = per_cycle.trips_us[of_sort], self.network.profile.bus, len(of_sort)
         planned = EthercatCycle(self.network, LAST_BYTE, sort.numbers[0])
         in_trip = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
         planned_us = sum(planned.by_term[key] for key in in_trip) + planned.bias_us()
@@ -288,7 +306,7 @@ class Seen:
             "master's time", "us", bus.master_us, None, None, "at most", count, _MASTER, hidden=hidden
         )
         if hidden:
-            yield from (trip, master) if host_us else (trip,)
+            yield from (trip, master) if of_master else (trip,)
             return
         doubts = [
             *(doubt.us for doubt in devices_doubts(self.network)),
@@ -296,20 +314,22 @@ class Seen:
             bus.master_doubt_us,
             self.stamp_us * _TWO_STAMPS,
         ]
-        if host_us:
+        if of_master:
             typical_us = quantile(trips_us, 0.5).value
             yield RecordedFigure("round trip, median", "us", None, typical_us, None, "shown", count)
         longest = quantile(trips_us, self.share)
-        yield trip._replace(recorded=longest.value, uncertainty=expanded(*doubts, longest.uncertainty or 0.0))
-        if host_us:
-            longest_us = max(host_us, key=lambda us: quantile(us, self.share).value)
-            self.master = quantile(longest_us, self.share)
+        trip = trip._replace(recorded=longest.value, uncertainty=expanded(*doubts, longest.uncertainty or 0.0))
+        yield trip.located(self.frames.events(trips_us, cycles.first[of_sort]))
+        if of_master:
+            most = max(of_master, key=lambda some: quantile(per_cycle.host_us[some], self.share).value)
+            host_us = per_cycle.host_us[most]
+            self.master = quantile(host_us, self.share)
             yield master._replace(
                 recorded=self.master.value,
                 uncertainty=expanded(*doubts, self.master.uncertainty or 0.0),
-                events=len(longest_us),
-                note=f"median {quantile(longest_us, 0.5).value:.1f}: round trip less wire, devices and cables",
-            )
+                events=len(host_us),
+                note=f"median {quantile(host_us, 0.5).value:.1f}: round trip less wire, devices and cables",
+            ).located(self.frames.events(host_us, cycles.first[most]))
 
     def _layout(
         self, sort: UnitCycle, with_names: str, cycles: SeenCycles, of_sort: Ints, per_cycle: _CycleValues
@@ -319,7 +339,9 @@ class Seen:
         if sort.data_bytes:
             name, frames = f"frames in a cycle{with_names}", int(per_cycle.frames[of_sort[0]]) if count else None
             hidden = "" if count else "no such cycle is in the recording"
-            yield RecordedFigure(name, "1", planned.frames, frames, None, "equal", count, hidden=hidden)
+            figure = RecordedFigure(name, "1", planned.frames, frames, None, "equal", count, hidden=hidden)
+            number = per_cycle.frames[of_sort].astype(np.float64)
+            yield figure.located(self.frames.events(number, cycles.first[of_sort]))
         if not count:
             return
         # The middle one of the most frequent cycles is shown: now and then a master adds a datagram.
@@ -328,7 +350,7 @@ class Seen:
         usual = of_sort[per_cycle.datagrams_bytes[of_sort] == usual_bytes]
         places = cycles.frames[cycles.number == usual[len(usual) // 2]]
         layouts = [self.frames.layouts[layout] for layout in self.frames.layout[places]]
-        yield RecordedFigure(
+        figure = RecordedFigure(
             f"datagrams of a cycle{with_names}",
             "bytes",
             planned.datagrams_bytes,
@@ -341,6 +363,7 @@ class Seen:
                 for layout in layouts
             ),
         )
+        yield figure.located(self.frames.events(per_cycle.datagrams_bytes[of_sort], cycles.first[of_sort]))
         added = [part for layout in layouts for part in layout if not self._is_process_data(part)]
         if sort is cycles.sorts[0] and _datagrams_bytes(added) != housekeeping_bytes(self.network):
             self.master_bytes = [part.data_bytes for part in added]
@@ -349,12 +372,13 @@ class Seen:
         """Figures of frames that did not return, and of frames with a wrong working counter."""
         frames, trips = self.frames, self.trips
         sent = int(np.count_nonzero(~frames.returned))
-        yield self._missed("lost frames", len(trips.lost), sent, "", self._dropped)
+        yield self._counted("lost frames", trips.lost, sent, "", self._dropped)
         back = trips.returned[self.is_data[trips.returned]]
         if len(back):
             right = _usual(frames.counters[back], frames.layout[back])
-            wrong = int(np.count_nonzero(frames.counters[back] != right))
-            yield self._missed("wrong working counters", wrong, len(back), "the most frequent ones are taken for right")
+            wrong = back[frames.counters[back] != right]
+            note = "the most frequent ones are taken for right"
+            yield self._counted("wrong working counters", wrong, len(back), note)
 
     def _byte(self) -> Iterator[RecordedFigure]:
         """Time of a byte, from frames that were alone on the ring: others wait for those before them."""

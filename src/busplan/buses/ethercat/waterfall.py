@@ -66,7 +66,7 @@ class _EthercatCycles(RecordedCycles):
         self.synthetic = seen.frames.notes.synthetic
         periods, count = seen.cycles.periods, len(seen.cycles.first)
         self.numbers = (1 + (np.arange(count) if periods is None else periods.places)).tolist()
-        self.times_us = (seen.frames.times_ns - seen.frames.times_ns[0]) / 1000
+        self.times_us = (seen.frames.times_ns - (seen.frames.notes.start_ns or 0)) / 1000
         self.back = np.full(len(self.times_us), -1)
         self.back[seen.trips.sent] = seen.trips.returned
         ends_us = np.full(count, -np.inf)
@@ -98,7 +98,7 @@ class _EthercatCycles(RecordedCycles):
 
     def _number(self, frame: int) -> int:
         """Number of a frame in the recording."""
-        return frame + 1
+        return int(self.seen.frames.numbers[frame])
 
     def _sent(self, place: int) -> list[_Sent]:
         """Frames of a cycle; one that is handed over early waits for the frame before it."""

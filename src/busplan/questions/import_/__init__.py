@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from busplan.buses.can.equations import USUAL_DATA_BIT_RATE
 from busplan.errors import ArgumentError, BusplanError
 from busplan.forms import blocks
 from busplan.profile.document import decode, validate
@@ -194,7 +195,7 @@ def _load_words(profile: Profile, fullest: can.MostLoad) -> str:
     bus: Any = profile.bus
     cycle: Any = deciding_cycle(network_of(profile))
     planned = float(cycle.load)
-    recorded = fullest.load(bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s or can.DATA_BIT_RATE)
+    recorded = fullest.load(bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s or USUAL_DATA_BIT_RATE)
     words = (
         f"The plan has a load of {100 * planned:.3g} %, the fullest second of the log {100 * recorded:.3g} %, both "
         f"with the most stuff bits; {fullest.seconds:,} of its {fullest.of_seconds:,} s have frames"

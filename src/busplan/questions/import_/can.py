@@ -5,6 +5,7 @@ from itertools import groupby
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from busplan.buses.can.equations import USUAL_DATA_BIT_RATE
 from busplan.buses.can.traffic import HOST
 from busplan.english import first_of
 from busplan.errors import BusplanError
@@ -52,8 +53,6 @@ _MOST_JITTER: Final = 0.5
 _CLEARLY: Final = 0.02
 """Share by which a recorded period must be shorter than a database's to count [1]."""
 _DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
-DATA_BIT_RATE: Final = 2000.0
-"""Data bit rate of CAN FD that no file gives [kbit/s]."""
 _USUAL_BIT_RATE: Final = 1000
 """Usual bit rate of machines [kbit/s]."""
 _USUAL_OF_CARS: Final = 500
@@ -130,7 +129,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     yield ProfileLine("bus", BIT_RATE, bus.get(BIT_RATE) or usual)
     if sum(row.key == "fd" for row in messages) > sum(row.key == "brs" for row in messages):
         note = f"no file says it{'; SYNC and PDOs are FD frames with it, too' if nodes else ''}"
-        yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or assumed(DATA_BIT_RATE, note))
+        yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or assumed(USUAL_DATA_BIT_RATE, note))
     if bits != _BASE_BITS:
         yield ProfileLine("bus", "identifier_bits", machine.fact(bits, 1, note="used by most messages"))
     if nodes:
@@ -462,12 +461,10 @@ def give_bit_rate(machine: Reading, bit_rate_kbit_s: float) -> None:
 
     If frames of a log need more, it raises BusplanError.
     """
-    least = machine.bus[LEAST].value.surely if LEAST in machine.bus else 0.0
-    if bit_rate_kbit_s < least:
-        raise BusplanError(
-            f"bit rate {bit_rate_kbit_s:g}: frames of the log need at least {least:.3g} kbit/s, because they do "
-            "not overlap"
-        )
+    if LEAST in machine.bus:
+        from busplan.recordings.can_timing import require_bit_rate
+
+        require_bit_rate(bit_rate_kbit_s, machine.bus[LEAST].value)
     machine.bus[BIT_RATE] = Fact(bit_rate_kbit_s, note="as given to import")
 
 

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.buses.can.equations import BASE_BITS, frame_us
+from busplan.buses.can.equations import BASE_BITS, USUAL_DATA_BIT_RATE, frame_us
 from busplan.buses.rule import CLOCK_TOLERANCE
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
@@ -15,7 +15,6 @@ from busplan.progress import Progress
 from busplan.questions.import_.can import (
     ASK,
     BIT_RATE,
-    DATA_BIT_RATE,
     FULLEST,
     LEAST,
     MOST_OF_FULLEST,
@@ -30,14 +29,6 @@ from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, steady_rate
 
-_BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
-"""Usual bit rates [kbit/s]."""
-_NEAR: Final = 0.02
-"""Share by which frames in direct succession may seem to be off a bit rate, by their stamps [1]."""
-_ABOUT: Final = 0.9
-"""Share of a bit rate from which frames seem to be in direct succession [1]."""
-_SHARP: Final = 0.8
-"""Share of those frames at the bit rate itself, if it is that of the bus [1]."""
 _LEAST_US: Final = 30.0
 """Least distance of two frames of an identifier [us]."""
 _MOST_US: Final = 1e8
@@ -127,7 +118,7 @@ def _timings(messages: Sequence[can_timing.SentFrames], stretch: can_timing.Cloc
     have grown by more frames than that has.
     """
     longest_us = [_longest_us(sent) for sent in messages]
-    most = MOST_OF_FULLEST * can_timing.fullest_load(*_wire_us(messages, longest_us))
+    most = MOST_OF_FULLEST * float(can_timing.second_loads(*_wire_us(messages, longest_us)).max())
     window_us, share = can_timing.WINDOW_US, 1.0
     rows = [sent.periods is not None for sent in messages]
     before: list[_Timing] = []
@@ -160,7 +151,7 @@ def _is_always(sent: can_timing.SentFrames, stretch: can_timing.ClockStretch) ->
 
 
 def _longest_us(
-    sent: can_timing.SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_kbit_s: float = DATA_BIT_RATE
+    sent: can_timing.SentFrames, bit_rate_kbit_s: float = 500.0, data_bit_rate_kbit_s: float = USUAL_DATA_BIT_RATE
 ) -> float:
     """Time on the wire of an identifier's longest frame, with the most stuff bits [us]."""
     switched = max(data_bit_rate_kbit_s, bit_rate_kbit_s) if sent.switches else bit_rate_kbit_s
@@ -185,9 +176,9 @@ def _wire_us(messages: Sequence[can_timing.SentFrames], longest_us: Sequence[flo
 def _fullest(messages: Sequence[can_timing.SentFrames], stretch: can_timing.ClockStretch) -> MostLoad:
     """Load of the log's fullest second by bit rates, and number of its seconds with frames."""
 
-    def load(bit_rate_kbit_s: float, data_bit_rate_kbit_s: float = DATA_BIT_RATE) -> float:
+    def load(bit_rate_kbit_s: float, data_bit_rate_kbit_s: float = USUAL_DATA_BIT_RATE) -> float:
         us = [_longest_us(sent, bit_rate_kbit_s, data_bit_rate_kbit_s) for sent in messages]
-        return can_timing.fullest_load(*_wire_us(messages, us))
+        return float(can_timing.second_loads(*_wire_us(messages, us)).max())
 
     seconds = np.unique((stretch.times_us - stretch.times_us[0]) // can_timing.WINDOW_US)
     return MostLoad(load, len(seconds), int(seconds[-1]) + 1)
@@ -284,14 +275,12 @@ def _bit_rate(
 ) -> None:
     """Bit rate that frames in direct succession show; else the question for it."""
     machine.bus[LEAST] = Fact(least)
-    bits, apart_us = frames.bits[stretch.taken][1:], np.diff(stretch.times_us)
-    rates = 1000 * bits / np.maximum(apart_us, 1e-3)
-    possible = [rate for rate in _BIT_RATES if rate >= least.surely]
-    shown = [rate for rate in possible if _is_shown(rate, rates)]
-    if shown:
+    possible = can_timing.possible_bit_rates(least)
+    shown = can_timing.shown_bit_rate(frames, stretch, possible)
+    if shown is not None:
         by = "from back-to-back frames in the log"
-        machine.bus[BIT_RATE] = machine.bus[SHOWN] = assumed(shown[0], by)
-        machine.remarks.append(f"The bit rate is {shown[0]:g} kbit/s, {by}")
+        machine.bus[BIT_RATE] = machine.bus[SHOWN] = assumed(shown, by)
+        machine.remarks.append(f"The bit rate is {shown:g} kbit/s, {by}")
         return
     loads = [(rate, fullest.load(rate)) for rate in possible]
     listed = [f"{100 * load:.2g} % at {rate:g}" for rate, load in loads if load <= 1]
@@ -299,9 +288,3 @@ def _bit_rate(
         f"{machine.file}: does not show the bit rate of its bus, on which all times depend; give --bit-rate RATE, "
         f"in kbit/s. The load of its fullest second is {', '.join(listed) or 'over 100 % at any'}"
     )
-
-
-def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:
-    """Whether frames follow each other as at a bit rate, with hardly any closer or a little later."""
-    near = np.count_nonzero(np.abs(rates / bit_rate_kbit_s - 1) <= _NEAR)
-    return bool(near >= LEAST_EVENTS and near >= _SHARP * np.count_nonzero(rates >= _ABOUT * bit_rate_kbit_s))

@@ -24,6 +24,7 @@ from busplan.questions.fit.network import network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
 from busplan.questions.timeline.recorded import MEDIAN, WORST, Chosen, RecordedTimelineAnswer, answer_of, place_of
 
+__all__ = ["RecordedTimelineAnswer", "TimelineAnswer", "timeline"]
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 

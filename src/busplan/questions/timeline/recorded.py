@@ -59,7 +59,7 @@ class Difference(NamedTuple):
     frame: int | None
     """Its number in the recording, from 1."""
     at_s: float | None
-    """End of what is late, after the first stamp of the recording [s]."""
+    """Its end after the first stamp of the recording [s]."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -182,5 +182,6 @@ def _difference(shown: Waterfall, shares: tuple[Share, ...]) -> Difference:
     if not found.is_longer or frame is None or late_us[frame] <= share.uncertainty_us:
         return found
     event = last[frame]
-    at_s = shown.start_s + event.end_us / 1e6
+    sent = (each for each in shown.events if each.frame == frame and each.waits_for in ("wire", "others"))
+    at_s = shown.start_s + max(event.end_us, *(each.end_us for each in sent), 0.0) / 1e6
     return found._replace(cause=event.label, node=event.node, late_us=late_us[frame], frame=frame, at_s=at_s)
