@@ -102,15 +102,17 @@ def truth_of_sync(machine: Machine, logged: Iterable[Logged], cycle: int) -> dic
 
 
 def sync_plan(seed: int) -> dict[str, Any]:
-    """A machine of groups with SYNC and other messages."""
+    """A machine of groups with SYNC and other messages, classical or FD."""
     random = Random(seed)
+    rate, fd = random.choice((500, 1000)), random.random() < 0.3
     return {
         "name": "random",
-        "bus": {"kind": "can", "bit_rate_kbit_s": random.choice((500, 1000)), "host_us": random.choice((0, 60, 300))},
+        "bus": {"kind": "can", "bit_rate_kbit_s": rate, "host_us": random.choice((0, 60, 300))}
+        | ({"data_bit_rate_kbit_s": 4 * rate} if fd else {}),
         "cycle": {"period_us": random.choice((10_000, 20_000))},
         "group": [
             {"name": name, "nodes": random.randint(1, 4), "axes": 1, "execution": execution(random, 600)}
-            | pdos(random, fd=False)
+            | pdos(random, fd=fd)
             for name in ("drives", "valves")[: random.randint(1, 2)]
         ],
         "message": [

@@ -79,8 +79,8 @@ class _CanCycles(RecordedCycles):
         needed, rate = can_timing.least_bit_rate(frames, stretch).surely, traffic.bit_rate_kbit_s
         if needed > rate:
             raise BusplanError(
-                f"its frames need {needed:,.0f} kbit/s, and bus.bit_rate_kbit_s = {rate:g}: they do not fit on the wire "
-                "of the plan"
+                f"its frames need {needed:,.0f} kbit/s, and bus.bit_rate_kbit_s = {rate:g}: they do not fit on the "
+                "wire of the plan"
             )
         self.step_us = can_timing.step_us(stretch)
         self.stamp_error_us = self.step_us + can_timing.late_stamps_us(frames, stretch, bit_us(rate))
@@ -91,7 +91,7 @@ class _CanCycles(RecordedCycles):
         self.stuffing_us = np.where(frames.is_fd[stretch.taken], (wire.worst_us - wire.none_us) / 2, 0.0)
         # A frame ends before the next one begins: a stamp beyond that is late. Of the time since 1970 a float holds
         # whole microseconds.
-        sent_us = self.wire_us.cumsum()
+        sent_us = np.where(frames.is_fd[stretch.taken], wire.none_us, wire.us).cumsum()
         self.ends_us: Floats = np.minimum.accumulate((np.rint(stretch.times_us) - sent_us)[::-1])[::-1] + sent_us
         self.begin_us = float(stretch.times_us[0]) - frames.lead_us
         """Time of the first frame of the recording [us]."""
@@ -123,8 +123,17 @@ class _CanCycles(RecordedCycles):
                 for stream in sent
                 if (stream.identifier_bits > BASE_BITS) == is_extended and stream.first <= identifier <= stream.last
             ]
-            unplanned = _Sender("", f"{identifier:#x}, no message of the plan")
-            yield key, self._of_stream(of_plan[0], identifier) if of_plan else unplanned
+            yield key, self._of_stream(of_plan[0], identifier) if of_plan else self._unplanned(key)
+
+    def _unplanned(self, key: int) -> _Sender:
+        """An identifier that the plan does not have: an emergency, or whatever it is."""
+        words = f"{key >> 1:#x}, no message of the plan"
+        is_canopen = self.traffic.has_sync and self.names.sent[0].first == EMERGENCY
+        found = emergencies(self.frames, self.taken[self.key == key])
+        if is_canopen and len(found.frames):
+            node = int(found.nodes[0])
+            words = f"emergency of {self.names.by_node_id.get(node, f'node-ID {node}')} ({key >> 1:#x})"
+        return _Sender("", words)
 
     def _of_stream(self, stream: Stream, identifier: int) -> _Sender:
         label, frame_us = self.names.name(stream, identifier), float(stream.frame_us)
@@ -189,7 +198,7 @@ class _CanCycles(RecordedCycles):
             self.number_of(first),
             events,
             self._planned(cycle),
-            self._doubts_us(events, float(self.stuffing_us[first : last + 1].sum())),
+            self._doubts_us(events, cycle, slice(first, last + 1)),
             tuple(self._remarks(cycle)),
         )
 
@@ -251,12 +260,16 @@ class _CanCycles(RecordedCycles):
                     found.append(key)
         return found
 
-    def _doubts_us(self, events: Sequence[WaterfallEvent], stuffing_us: float) -> dict[Awaited, float]:
+    def _doubts_us(self, events: Sequence[WaterfallEvent], cycle: int, places: slice) -> dict[Awaited, float]:
         """Largest error of each sum: lengths are exact, and waits of one sort in a row lie between two stamps."""
-        doubts_us: dict[Awaited, float] = {"wire": stuffing_us, "others": stuffing_us}
+        stuffing_us, is_own = self.stuffing_us[places], self.cycle_of[places] == cycle
+        doubts_us: dict[Awaited, float] = {
+            "wire": float(stuffing_us[is_own].sum()),
+            "others": float(stuffing_us[~is_own].sum()),
+        }
         waited = [event.waits_for for event in events if event.waits_for not in doubts_us]
         for awaited, _ in groupby(waited):
-            doubts_us[awaited] = doubts_us.get(awaited, stuffing_us) + self.stamp_error_us
+            doubts_us[awaited] = doubts_us.get(awaited, float(stuffing_us.sum())) + self.stamp_error_us
         return doubts_us
 
     def _planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
@@ -277,8 +290,8 @@ class _CanCycles(RecordedCycles):
         if missing:
             yield f"Never came in this cycle: {first_of(missing, can_timing.LISTED)}."
         yield (
-            f"Frames have their length at {self.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these have "
-            f"an error of up to {self.stamp_error_us:g} us."
+            f"Frames have their length at {self.traffic.bit_rate_kbit_s:g} kbit/s and end with their stamps; these "
+            f"have an error of up to {self.stamp_error_us:g} us."
         )
         if self.stamp_error_us > self.step_us + _STAMP_US:
             yield "Frames come closer than the bus allows: stamps are late."
