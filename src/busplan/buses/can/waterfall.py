@@ -1,5 +1,6 @@
 """A cycle of a CAN log as events: its frames, those of others between them, and the waits for nodes and host."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -268,9 +269,11 @@ class _CanCycles(RecordedCycles):
             "others": float(stuffing_us[~is_own].sum()),
         }
         waited = [event.waits_for for event in events if event.waits_for not in doubts_us]
-        for awaited, _ in groupby(waited):
-            doubts_us[awaited] = doubts_us.get(awaited, float(stuffing_us.sum())) + self.stamp_error_us
-        return doubts_us
+        rows = Counter(awaited for awaited, _ in groupby(waited))
+        # Late stamps may hide a wait.
+        waits: tuple[Awaited, ...] = ("nodes", "host", *rows)
+        of_row_us, rest_us = self.stamp_error_us, float(stuffing_us.sum())
+        return doubts_us | {awaited: rest_us + max(rows[awaited], 1) * of_row_us for awaited in waits}
 
     def _planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
         """The planned cycle with the groups that are seen, from its first frame to its last one."""
