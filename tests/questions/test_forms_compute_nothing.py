@@ -52,6 +52,12 @@ def recorded(profile: busplan.Profile, folder: Path) -> busplan.MeasuredAnswer:
     return busplan.measured(profile, path)
 
 
+def beside(profile: busplan.Profile, folder: Path) -> busplan.RecordedTimelineAnswer:
+    """A cycle of such a recording."""
+    recorded(profile, folder)
+    return busplan.timeline(profile, recording=next(folder.glob("recording.*")))
+
+
 Ask = Callable[[busplan.Profile, Path], Any]
 QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "calibrate": (lambda profile, _: busplan.calibrate(profile, TABLE), ("paper-1ms",)),
@@ -72,6 +78,7 @@ QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "report": (lambda profile, _: busplan.report(profile, circle=False), ("paper-1ms",)),
     "sweep": (lambda profile, _: busplan.sweep(profile, vary=Y), KINDS),
     "timeline": (lambda profile, _: busplan.timeline(profile), KINDS),
+    "timeline of a recording": (beside, ("can-servo-8", "ethercat-servo-8", "can-motors-8")),
 }
 """Each question, and the machines that it is asked of."""
 ASKED = [

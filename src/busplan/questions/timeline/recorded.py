@@ -95,6 +95,11 @@ class RecordedTimelineAnswer(Answer):
     synthetic: str
     """Words of the recording on its emulation; empty without them."""
 
+    @property
+    def difference_us(self) -> float:
+        """Recorded time less planned time [us]."""
+        return self.recorded_us - self.planned_us
+
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.timeline.recorded_report import recorded_report

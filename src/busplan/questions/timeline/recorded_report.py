@@ -35,6 +35,14 @@ _COLUMNS: Final = (
     blocks.TableColumn("share", "%"),
     blocks.TableColumn("difference", "us"),
 )
+_EVENT_COLUMNS: Final = (
+    blocks.TableColumn("waits for", kind="words"),
+    blocks.TableColumn("frame", kind="words", wraps=True),
+    blocks.TableColumn("number"),
+    blocks.TableColumn("start", "us"),
+    blocks.TableColumn("time", "us"),
+    blocks.TableColumn("beyond the plan", "us"),
+)
 
 
 def recorded_report(answer: RecordedTimelineAnswer) -> blocks.Report:
@@ -48,6 +56,7 @@ def recorded_report(answer: RecordedTimelineAnswer) -> blocks.Report:
             _chart(answer, sentence_text(summary)),
             _table(answer),
             _difference(answer),
+            blocks.Detail((_events_table(answer),), "each frame and each wait"),
             *(blocks.Sentence((remark,)) for remark in answer.remarks),
         ),
         _document(answer),
@@ -127,16 +136,33 @@ def _table(answer: RecordedTimelineAnswer) -> blocks.Table:
             (
                 "cycle",
                 _us(answer.recorded_us, "recorded_us"),
-                _percent(1.0, "recorded_share"),
+                "",
                 "",
                 _us(answer.planned_us, "planned_us"),
-                _percent(1.0, "planned_share"),
-                _us(answer.recorded_us - answer.planned_us, "difference_us", signed=True),
+                "",
+                _us(answer.difference_us, "difference_us", signed=True),
             ),
             highlighted=True,
         )
     )
     return blocks.Table(_COLUMNS, tuple(rows), blocks.Sentence(("Where the time of the cycle goes",)))
+
+
+def _events_table(answer: RecordedTimelineAnswer) -> blocks.Table:
+    rows = (
+        blocks.TableRow(
+            (
+                _word(answer, event.waits_for),
+                event.label,
+                blocks.ShownValue(event.frame, "frame"),
+                _us(event.start_us, "start_us"),
+                _us(event.duration_us, "duration_us"),
+                _us(event.late_us, "late_us"),
+            )
+        )
+        for event in answer.events
+    )
+    return blocks.Table(_EVENT_COLUMNS, tuple(rows), blocks.Sentence(("The recorded cycle, frame by frame",)))
 
 
 def _difference(answer: RecordedTimelineAnswer) -> blocks.Sentence:
@@ -165,9 +191,9 @@ def _document(answer: RecordedTimelineAnswer) -> blocks.JsonDocument:
     return document(
         "timeline",
         profile=answer.profile.name,
-        **fields(
-            answer, "source", "chosen", "cycles", "cycle", "start_s", "frame", "recorded_us", "planned_us", "synthetic"
-        ),
+        **fields(answer, "source", "chosen", "cycles", "cycle", "start_s", "frame", "recorded_us", "planned_us"),
+        difference_us=answer.difference_us,
+        synthetic=answer.synthetic or None,
         shares=[{**share._asdict(), "difference_us": share.difference_us} for share in answer.shares],
         difference={**difference, "cause": difference["cause"] or None, "node": difference["node"] or None},
         remarks=list(answer.remarks),
