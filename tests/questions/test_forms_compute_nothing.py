@@ -78,12 +78,12 @@ QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "report": (lambda profile, _: busplan.report(profile, circle=False), ("paper-1ms",)),
     "sweep": (lambda profile, _: busplan.sweep(profile, vary=Y), KINDS),
     "timeline": (lambda profile, _: busplan.timeline(profile), KINDS),
-    "timeline of a recording": (beside, ("can-servo-8", "ethercat-servo-8", "can-motors-8")),
 }
 """Each question, and the machines that it is asked of."""
+BESIDE = {"timeline of a recording": (beside, ("can-servo-8", "ethercat-servo-8", "can-motors-8"))}
 ASKED = [
     pytest.param(ask, profile, id=f"{question} {name}")
-    for question, (ask, names) in QUESTIONS.items()
+    for question, (ask, names) in {**QUESTIONS, **BESIDE}.items()
     for name, profile in machines(*names)
 ]
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 import tomli_w
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import busplan
@@ -137,6 +137,7 @@ def written(folder: Path, plan: dict[str, Any]) -> Path:
     return path
 
 
+@example(2001, 500.0, 1.0)
 @given(SEEDS, st.sampled_from([0.0, 0.0, 50.0, 500.0]), st.sampled_from([1.0, 10.0]))
 def test_shares_of_a_cycle_of_sync_are_those_of_the_machine(
     folder: Path, seed: int, latency_us: float, step_us: float
@@ -151,7 +152,12 @@ def test_shares_of_a_cycle_of_sync_are_those_of_the_machine(
     cycle = Random(seed).randrange(3, 25)
     answer = shown(folder, candump(stamped, step_us=step_us), written(folder, machine.plan), cycle=cycle + 1)
     agrees(answer, truth_of_sync(machine, logged, cycle))
-    assert answer.difference.waits_for in ("wire", "nodes", "host", "others")
+    # The plan beside it is that of a cycle with the same groups.
+    nodes, planned = (
+        {event.node for event in events if event.waits_for == "wire"}
+        for events in (answer.events, answer.planned_events)
+    )
+    assert nodes == planned
 
 
 @given(SEEDS, st.booleans())
@@ -278,6 +284,61 @@ def test_what_the_host_waited_for_is_not_told_where_an_answer_never_came(folder:
     assert shares.get("host", 0.0) <= 1
     assert shares["unknown"] > 1000
     assert "Never came in this cycle: feedback of node 1 (0x181)." in answer.remarks
+
+
+def rows(*sent: tuple[float, int], cycles: int = 12, hit: int = 5, late: dict[int, float | None]) -> str:
+    """A log of frames by their ends in a cycle of 8 ms; in one cycle some come later, or never."""
+    frames = []
+    for cycle in range(cycles):
+        for us, identifier in sent:
+            later_us = late.get(identifier, 0.0) if cycle == hit else 0.0
+            if later_us is not None:
+                frames.append(Logged(8000.0 * cycle + us + later_us, identifier, b"\x55" * 8, False, 0))
+    return candump(sorted(frames, key=lambda frame: frame.us))
+
+
+def test_the_latest_node_is_named_and_not_the_one_with_the_longest_wait(folder: Path) -> None:
+    plan = {
+        "name": "random",
+        "bus": {"kind": "can", "bit_rate_kbit_s": 1000, "host_us": 50, "nodes": 3},
+        "cycle": {"period_us": 8000},
+        "payload": {"read_bytes": 8, "write_bytes": 8},
+        "node": {"axes": 1, "execution": {"kind": "linear", "base_us": 700, "per_byte_us": 0, "grade": "measured"}},
+    }
+    sent = ((0, 0x80), (810, 0x181), (930, 0x182), (1050, 0x183), (1250, 0x201), (1370, 0x202), (1490, 0x203))
+    log = rows(*sent, late={0x182: 400.0, 0x183: 400.0, 0x201: 450.0, 0x202: 450.0, 0x203: 450.0})
+    answer = shown(folder, log, written(folder, plan))
+    found = answer.difference
+    assert (answer.cycle, found.waits_for, found.node, found.frame) == (6, "nodes", "node 2", 5 * 7 + 3)
+    assert found.late_us == pytest.approx(400, abs=30)
+
+
+@pytest.mark.parametrize("late_us", [None, 500.0])
+def test_a_request_behind_one_without_an_answer_waits_for_nobody_knows_whom(
+    folder: Path, late_us: float | None
+) -> None:
+    plan = busplan.load_profile("can-motors-8", changes={"bus.nodes": 2})
+    sent = ((0, 0x141), (300, 0x241), (500, 0x142), (800, 0x242))
+    answer = shown(folder, rows(*sent, late={0x241: late_us}), plan, cycle=6)
+    shares = {share.waits_for: share.recorded_us for share in answer.shares}
+    assert shares["unknown"] == pytest.approx(500 - 115, abs=10)
+    assert "host" not in shares or not shares["host"]
+
+
+def test_frames_that_are_handed_over_at_once_go_one_behind_the_other(folder: Path) -> None:
+    plan = busplan.load_profile("ethercat-servo-8", changes={"bus.nodes": 2})
+    frames = ((12, 0x10000, 700), (14, 0, 8)), ((12, 0x20000, 600),)
+    machine = ethercat_recording.Machine(devices=2, schedule=(frames,), counters=())
+    packets = ethercat_recording.simulated(machine, 20)
+    # The second frame of each cycle is stamped just behind the first one, which the wire still has.
+    sent_us = [us for us, content in packets if not content[6] & 2]
+    behind = dict(zip(sent_us[1::2], sent_us[::2], strict=True))
+    early = [(behind[us] + 0.01 if us in behind else us, content) for us, content in packets]
+    logs = packets, early
+    first, second = (shown(folder, ethercat_recording.pcapng(sorted(log)), plan, cycle=5).shares for log in logs)
+    assert [share.waits_for for share in first] == [share.waits_for for share in second]
+    for one, other in zip(first, second, strict=True):
+        assert one.recorded_us == pytest.approx(other.recorded_us, abs=0.05)
 
 
 def test_an_error_frame_and_what_it_destroys_are_not_attributed(folder: Path) -> None:

@@ -102,10 +102,10 @@ class _CanCycles(RecordedCycles):
         self.places = {key: np.flatnonzero(self.key == key) for key in self.senders}
         self.anchor = self._anchor()
         self.cycle_of, self.cycles = self._aligned()
-        frames = np.flatnonzero(self.cycle_of >= 0)
+        cyclic = np.flatnonzero(self.cycle_of >= 0)
         self.first, self.last = (np.zeros(int(self.cycle_of.max()) + 1, dtype=np.int64) for _ in range(2))
         self.first[self.cycle_of[self.places[self.anchor]]] = self.places[self.anchor]
-        np.maximum.at(self.last, self.cycle_of[frames], frames)
+        np.maximum.at(self.last, self.cycle_of[cyclic], cyclic)
         self.numbers = (self.cycles + 1).tolist()
         first, last = self.first[self.cycles], self.last[self.cycles]
         self.lengths_us = (self.ends_us[last] - self.ends_us[first] + self.wire_us[first]).tolist()
