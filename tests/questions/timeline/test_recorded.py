@@ -260,9 +260,11 @@ def test_an_echo_of_789_us_is_56_to_68_percent_wire(folder: Path) -> None:
         rows = [
             Logged(10_000.0 * cycle + us, identifier, data, False, bits)
             for cycle in range(20)
-            for us, identifier in ((2 * bits, 0x141), (789, 0x241))
+            # The 20th cycle is not whole, and the 10th the median one.
+            for us, identifier in ((2 * bits, 0x141), (789 + 7 * (cycle - 9), 0x241))
         ]
         answer = shown(folder, candump(rows), plan, cycle="median")
+        assert (answer.cycle, answer.cycles) == (10, 19)
         assert answer.recorded_us == pytest.approx(789, abs=1.5)
         (wire, nodes) = answer.shares
         assert (wire.waits_for, nodes.waits_for) == ("wire", "nodes")
@@ -304,6 +306,8 @@ def test_the_latest_node_is_named_and_not_the_one_with_the_longest_wait(folder: 
         "cycle": {"period_us": 8000},
         "payload": {"read_bytes": 8, "write_bytes": 8},
         "node": {"axes": 1, "execution": {"kind": "linear", "base_us": 700, "per_byte_us": 0, "grade": "measured"}},
+        # Planned, and not in the log: a larger difference, but not a longer share.
+        "message": [{"name": "early", "identifier": 0x70, "payload_bytes": 8, "period_us": 1000, "burst": 3}],
     }
     sent = ((0, 0x80), (810, 0x181), (930, 0x182), (1050, 0x183), (1250, 0x201), (1370, 0x202), (1490, 0x203))
     log = rows(*sent, late={0x182: 400.0, 0x183: 400.0, 0x201: 450.0, 0x202: 450.0, 0x203: 450.0})
