@@ -1,5 +1,6 @@
 """Errors for the user, with and without a place in a file."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final, Literal, NamedTuple
 
@@ -20,7 +21,10 @@ class BusplanError(Exception):
 
 
 class ArgumentError(BusplanError):
-    """A wrong argument of a question: each problem begins with the argument's name, then its value or a colon."""
+    """A wrong argument of a question: each problem begins with the argument's name, then its value or a colon.
+
+    A second argument may follow after "and", before the colon.
+    """
 
     def typed(self, options: Iterable[str]) -> BusplanError:
         """The error of a command with some options: it names the one that gives the argument, as typed."""
@@ -29,10 +33,16 @@ class ArgumentError(BusplanError):
 
 
 def _typed(problem: str, names: Mapping[str, str]) -> str:
-    argument = problem.partition(" ")[0].rstrip(":")
-    # An argument may end in its unit, which is typed with the value of an option.
-    option = next((option for name, option in names.items() if f"{argument}_".startswith(f"{name}_")), argument)
-    return f"{option}{problem.removeprefix(argument)}"
+    def option(match: re.Match[str]) -> str:
+        # An argument may end in its unit, which is typed with the value of an option.
+        given = (option for name, option in names.items() if f"{match[0]}_".startswith(f"{name}_"))
+        return next(given, match[0])
+
+    arguments, colon, why = problem.partition(":")
+    return f"{re.sub(_ARGUMENTS, option, arguments)}{colon}{why}"
+
+
+_ARGUMENTS: Final = re.compile(r"^\w+|(?<= and )\w+(?= |$)")
 
 
 class WorkerLostError(BusplanError):

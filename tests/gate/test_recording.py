@@ -34,7 +34,7 @@ def test_a_machine_within_its_plan_passes_and_one_outside_fails(run: Run, tmp_pa
     assert done.returncode == 1
     line = next(number for number, text in enumerate(path.read_text().splitlines(), 1) if "master_jitter_us" in text)
     assert f"press.toml:{line}:1: BP401 error: bus.master_jitter_us: latest start: " in done.stdout
-    assert " us recorded, at most 11.0 us planned; " in done.stdout
+    assert " us recorded, at most 11.0 us planned, first at 0.020017 s, frame 41; " in done.stdout
     assert "busplan measured --apply writes what was measured" in done.stdout
     # Half of the cycles keep it.
     assert "BP401" not in run(*words, "--quantile", "0.5", cwd=tmp_path).stdout
@@ -68,7 +68,9 @@ def test_what_no_key_plans_is_at_the_name(tmp_path: Path) -> None:
     answer = busplan.check(LOG.parent / "valid.toml", recording=log)
     (file,) = answer.files
     (finding,) = file.findings
-    assert finding.message == "name: frames of no message of the plan: 1 recorded, at most 0 planned (0x7aa)"
+    number = len(log.read_text().splitlines())
+    words = f"1 recorded, at most 0 planned, first at 0.999952 s, frame {number} (0x7aa)"
+    assert finding.message == f"name: frames of no message of the plan: {words}"
     assert (finding.line, finding.column) == (2, 1)
 
 

@@ -333,13 +333,18 @@ def simulated(machine: Machine) -> list[Logged]:
 
 def recorded(machine: Machine) -> tuple[bytes, dict[str, float]]:
     """A machine's log, which begins and ends anywhere in a cycle, and the truth of it."""
+    logged, stamped, start_s = in_log(machine)
+    return candump(stamped, start_s=start_s, step_us=machine.step_us).encode(), truth(machine, logged)
+
+
+def in_log(machine: Machine) -> tuple[list[Logged], list[Logged], float]:
+    """Frames of a machine's log, the same with the stamps of its recorder, and the time at which they begin [s]."""
     random = Random(-machine.seed)
     start_us = (1 + random.random()) * machine.period_us
     end_us = start_us + machine.cycles * machine.period_us
     logged = [frame for frame in simulated(machine) if start_us <= frame.us < end_us]
     stamped = list(handed_over(logged, machine.latency_us, random)) if machine.latency_us else logged
-    start_s = 1_700_000_000 + random.random()
-    return candump(stamped, start_s=start_s, step_us=machine.step_us).encode(), truth(machine, logged)
+    return logged, stamped, 1_700_000_000 + random.random()
 
 
 def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:

@@ -60,10 +60,11 @@ class Arm:
         )
 
     def _is_due(self, number: int, cycle: int) -> bool:
-        return cycle % self.nodes[number].every == 0 and cycle not in self.skipped
+        return number < len(self.nodes) and cycle not in self.skipped
 
     def _host(self, number: int, cycle: int) -> float:
-        us = self.random.uniform(0.2, 1) * self.plan["bus"].get("host_us", 0.0) + self.late.get((number, cycle), 0.0)
+        most_us: float = self.plan["bus"].get("host_us", 0.0)
+        us = self.random.uniform(0.2, 1) * most_us + self.late.get((number, cycle), 0.0)
         self.hosts[number, cycle] = us
         return us
 

@@ -147,26 +147,47 @@ def ethernet(
     return b"\xff" * 6 + source + tag + b"\x88\xa4" + struct.pack("<H", len(body) | 0x1000) + body
 
 
+class Packet(NamedTuple):
+    """A packet of a capture."""
+
+    us: float
+    content: bytes
+    trip: Trip
+    returned: bool
+
+
 def simulated(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, bytes]]:
     """Stamps [us] and packets of a number of cycles, in the order of time."""
+    return [packet[:2] for packet in packets_of(machine, cycles, seed=seed)]
+
+
+def packets_of(machine: Machine, cycles: int, *, seed: int) -> list[Packet]:
+    """Packets of a number of cycles, in the order of time."""
     packets = []
     for trip in trips(machine, cycles, seed=seed):
         index = trip.cycle % 256 if machine.has_index else 0
         counters = (machine.counters if not trip.is_poll else ()) or (3,) * len(trip.datagrams)
-        packets.append((trip.us, ethernet(trip.datagrams, index=index, counters=counters)))
+        packets.append(Packet(trip.us, ethernet(trip.datagrams, index=index, counters=counters), trip, returned=False))
         if trip.cycle not in machine.lost:
             counters = (0,) * len(counters) if trip.cycle in machine.wrong else counters
             back = ethernet(trip.datagrams, index=index, counters=counters, returned=True)
             # A program that copies frames stamps them as fast as it reads them, whatever their length.
-            packets.append((trip.back_us if machine.at_port else trip.us + 2 + trip.back_us % 3, back))
-    return sorted(packets, key=lambda packet: packet[0])
+            back_us = trip.back_us if machine.at_port else trip.us + 2 + trip.back_us % 3
+            packets.append(Packet(back_us, back, trip, returned=True))
+    return sorted(packets, key=lambda packet: packet.us)
+
+
+def in_capture(machine: Machine, cycles: int, *, seed: int) -> list[Packet]:
+    """Packets of a capture that drops none, from anywhere in the second cycle on."""
+    start_us = machine.period_us * (1 + Random(-seed).random())
+    return [packet for packet in packets_of(machine, cycles + 2, seed=seed) if packet.us >= start_us]
 
 
 def recorded(machine: Machine, cycles: int, *, seed: int = 1) -> tuple[bytes, dict[str, float]]:
     """A capture of a machine, which begins anywhere in its second cycle, and the truth of it."""
     random = Random(-seed)
     start_us = machine.period_us * (1 + random.random())
-    packets = [packet for packet in simulated(machine, cycles + 2, seed=seed) if packet[0] >= start_us]
+    packets = [packet[:2] for packet in in_capture(machine, cycles, seed=seed)]
     for _ in range(machine.dropped or 0):
         packets.pop(random.randrange(len(packets)))
     kind, step = machine.form.split()

@@ -6,7 +6,7 @@ from random import Random
 from typing import Final, Literal, NamedTuple
 
 from busplan.buses.network import Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError, BusplanError
 
 TIMES: Final = 5
 """Number of times that a fault happens by default."""
@@ -57,7 +57,7 @@ class Emulation:
         free = [cycle for cycle in among if cycle >= _FIRST and cycle not in self._hit]
         if number > len(free) // _ONE_OF:
             why = f"of {len(free):,} cycles that may have it, it takes a quarter at most; give more cycles"
-            raise BusplanError(f"fault {fault.name}: {number:,} times; {why}")
+            raise ArgumentError(f"fault {fault.name}: {number:,} times; {why}")
         drawn = frozenset(self.random.sample(free, number))
         self._hit |= drawn
         return drawn

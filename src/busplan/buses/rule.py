@@ -190,7 +190,8 @@ class RecordedFigure(NamedTuple):
         """Excess over the plan: the distance for "equal", else negative within; None where nothing is planned."""
         if self.residual is None or self.sense == "shown":
             return None
-        return self._beyond(self.residual)
+        beyond: float = self._beyond(self.residual)
+        return beyond
 
     def _beyond(self, residual: Any) -> Any:
         """Excess over the plan of a number, or of an array."""
@@ -220,6 +221,18 @@ class RecordedFigure(NamedTuple):
         if self.beyond <= self._rounding + doubt:
             return "within"
         return "outside" if self.beyond > self._most else "not shown"
+
+    @property
+    def first_words(self) -> str:
+        """Moment of the first event in words; empty without one."""
+        return "" if self.first_s is None else f"first at {self.first_s:.6f} s, frame {self.first_frame}"
+
+    @property
+    def worst_words(self) -> str:
+        """Moment of the worst event in words, where it is not the first; empty without one."""
+        if self.worst_s is None or self.worst_frame == self.first_frame:
+            return ""
+        return f"worst at {self.worst_s:.6f} s, frame {self.worst_frame}"
 
     def located(self, events: "Events") -> "RecordedFigure":
         """The figure with the moments of its first and its worst event.

@@ -432,7 +432,8 @@ def emulate_command(
 
     EtherCAT gives a capture of the master's port, pcapng, and CAN a log of candump. The file says that it is synthetic,
     not a measurement. Faults of EtherCAT: missing-cycle, lost-frame, wrong-working-counter, jitter. Faults of CAN:
-    missing-cycle, missing-pdo, double-pdo, late-command, jitter, error-frame. Exits 0 when it is written.
+    error-frame; with SYNC missing-cycle, missing-pdo, double-pdo, late-command, jitter; without it lost-answer,
+    double-answer, slow-node, slow-host. Exits 0 when it is written.
 
     Example: busplan emulate can-servo-8 --fault late-command -o log.candump
     """

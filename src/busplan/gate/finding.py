@@ -249,4 +249,5 @@ def _words(figure: RecordedFigure) -> str:
     doubt = "" if figure.uncertainty is None else f" +/- {factor * figure.uncertainty:.2g}"
     sense = "" if figure.sense == "equal" else f"{figure.sense} "
     note = f" ({figure.note})" if figure.note else ""
-    return f"{figure.quantity}: {recorded}{doubt}{unit} recorded, {sense}{allowed}{unit} planned{note}"
+    first = figure.first_words and f", {figure.first_words}"
+    return f"{figure.quantity}: {recorded}{doubt}{unit} recorded, {sense}{allowed}{unit} planned{first}{note}"

@@ -20,6 +20,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import ProfileLike, finite, load_network, whole_number, with_its_constants
 from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.fit.network import bus_of
+from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 _CYCLES = 1000
@@ -58,11 +59,11 @@ class EmulateAnswer(Answer):
     def report(self) -> Report:
         """Contents of the recording."""
         name = self.profile.name
-        length = f"{plural(self.cycles, 'cycle')}, {self.duration_us / 1e6:g} s, seed {self.seed}"
+        length = f"{plural(self.cycles, 'cycle')}, {_decimal(self.duration_us / 1e6)} s, seed {self.seed}"
         lines = [Sentence(("Synthetic recording of ", Code(name), f": {length}. It is not a measurement."))]
         records = []
         for fault, value in zip(self.described, self.faults.values(), strict=True):
-            often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {value:g} us"
+            often = plural(int(value), "time") if fault.unit == "1" else f"{TIMES} times, {_decimal(value)} us"
             is_inside = fault.name in self.inside
             shown = f"measured shows {fault.shown_as}"
             if is_inside:
@@ -118,13 +119,19 @@ def emulate(
     emulator = emulator_of(network.profile)
     period_us = emulator.period_us(network)
     if cycles is not None and duration_us is not None:
-        raise BusplanError("cycles and duration_us: give one of them")
+        raise ArgumentError("cycles and duration_us: give one of them")
     if duration_us is not None:
         cycles = ceil(finite(duration_us, name="duration_us") / period_us)
+        if not 1 <= cycles <= MAX_COUNT:
+            expected = f"a recording of 1 to {MAX_COUNT:,} cycles of {_decimal(period_us)} us"
+            raise ArgumentError(f"duration_us {_decimal(duration_us)} us: expected {expected}")
     number = whole_number(_CYCLES if cycles is None else cycles, name="cycles")
     if not isinstance(fault, Mapping | None):
         raise ArgumentError(f'fault {fault!r}: expected values by name, as {{"jitter": 50}}')
-    values = {name: _value(fault_named(emulator, name), value, period_us) for name, value in (fault or {}).items()}
+    values = {
+        name: _value(fault_named(emulator, name), value, period_us, number * period_us)
+        for name, value in (fault or {}).items()
+    }
     random = Random(whole_number(seed, name="seed"))  # noqa: S311 - jitter and data, no secret
     origin = f"emulated by busplan {__version__} from {network.profile.name}"
     content = emulator.emulated(network, Emulation(number, random, values, origin))
@@ -177,12 +184,20 @@ def fault_named(emulator: Emulator, name: str) -> Fault:
     return faults[name]
 
 
-def _value(fault: Fault, value: object, period_us: float) -> float:
+def _value(fault: Fault, value: object, period_us: float, duration_us: float) -> float:
     """Value of a fault: its number in the recording, or its delay [us]."""
     name = f"fault {fault.name}"
     if fault.unit == "1":
         return whole_number(int(fault.default) if value is None else value, name=name)
     late_us = fault.default * period_us if value is None else finite(value, name=name)
     if late_us <= 0:
-        raise BusplanError(f"{name}: {late_us:g}; expected a time above zero")
+        raise ArgumentError(f"{name}: {late_us:g}; expected a time above zero")
+    if late_us >= duration_us:
+        late, whole = _decimal(late_us), _decimal(duration_us)
+        raise ArgumentError(f"{name}: {late} us; expected a time below that of the recording, {whole} us")
     return late_us
+
+
+def _decimal(number: float) -> str:
+    """A number with up to six decimals, never in powers of ten."""
+    return f"{number:.6f}".rstrip("0").rstrip(".")

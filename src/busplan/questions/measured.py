@@ -198,7 +198,8 @@ def _named(answer: MeasuredAnswer, verdict: RecordedVerdict) -> str:
 def _row(figure: RecordedFigure) -> blocks.TableRow:
     shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
     unit = _UNITS.get(figure.unit, figure.unit)
-    note = ", ".join(filter(None, (figure.hidden, figure.note)))
+    moments = (figure.first_words, figure.worst_words) if figure.verdict in ("outside", "not shown") else ()
+    note = ", ".join(filter(None, (figure.hidden, figure.note, *moments)))
     cells = (figure.quantity, unit, *shown, _WITHIN[figure.verdict], blocks.ShownValue(figure.events, "events"), note)
     is_as_planned = figure.verdict == "within" and figure.recorded == figure.planned and not figure.uncertainty
     return blocks.TableRow(cells, is_detail=is_as_planned)

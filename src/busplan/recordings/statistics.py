@@ -195,6 +195,30 @@ def ahead(times_us: Floats, period_us: float) -> Floats:
     return np.asarray(early - np.minimum.accumulate(early), dtype=np.float64)
 
 
+def policed(times_us: Floats, period_us: float, allowed_us: float) -> Floats:
+    """Time by which each event at ascending times comes sooner than a period after the last that counts [us].
+
+    An event that comes too soon by more than is allowed does not count for those behind it: of one event too many all
+    others are `ahead`, and here only itself.
+
+    References
+    ----------
+    ITU-T I.371, generic cell rate algorithm.
+
+    Examples
+    --------
+    >>> times_us = np.array([0.0, 100, 130, 200, 300])
+    >>> policed(times_us, 100, 20).tolist(), ahead(times_us, 100).tolist()
+    ([0.0, 0.0, 70.0, 0.0, 0.0], [0.0, 0.0, 70.0, 100.0, 100.0])
+    """
+    early_us, due_us = np.zeros(len(times_us)), -inf
+    for place, us in enumerate(times_us.tolist()):
+        early_us[place] = max(due_us - us, 0.0)
+        if early_us[place] <= allowed_us:
+            due_us = max(due_us, us) + period_us
+    return early_us
+
+
 def steady_rate(times_us: Floats, window_us: float) -> float:
     """Slope of the arrival curve's concave hull at a window: the most events of windows about so long [1/us].
 

@@ -296,16 +296,6 @@ def test_the_card_says_how_many_buses_carry_all_motors(run: Run) -> None:
     assert "\n  buses " not in run("capacity", "can-motors-8").stdout
 
 
-@pytest.mark.parametrize("command", [("emulate", "can-motors-8", "-o", "x.log"), ("measured", "can-motors-8", "y.log")])
-def test_a_log_without_sync_is_neither_emulated_nor_compared(
-    run: Run, tmp_path: Path, command: tuple[str, ...]
-) -> None:
-    (tmp_path / "y.log").write_text("(1.0) can0 141#00\n", encoding="utf-8")
-    done = run(*command, cwd=tmp_path)
-    assert (done.returncode, (tmp_path / "x.log").exists()) == (2, False)
-    assert 'bus.access = "polled" has none' in done.stderr
-
-
 def test_a_new_profile_of_motors_has_no_sync(run: Run, tmp_path: Path) -> None:
     assert run("init", "arm", "--bus", "can-motors", cwd=tmp_path).returncode == 0
     profile = busplan.load_profile(tmp_path / "arm.toml")

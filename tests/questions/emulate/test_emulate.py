@@ -33,7 +33,12 @@ Refused = Callable[..., str]
 PROFILES = Path(__file__).parents[3] / "profiles"
 SHIPPED = ("ethercat-servo-8", "can-servo-8", "canopen-6", "can-fd-arm-7")
 SEEDS = {"can": range(10), "ethercat": range(6)}
-FAULTS = {kind: kind_named(kind).emulator().faults for kind in SEEDS}  # type: ignore[union-attr]
+OF_REQUESTS = ("lost-answer", "double-answer", "slow-node", "slow-host")
+"""Faults of a machine without SYNC."""
+FAULTS = {
+    kind: [fault for fault in kind_named(kind).emulator().faults if fault.name not in OF_REQUESTS]  # type: ignore[union-attr]
+    for kind in SEEDS
+}
 LOGICAL = {10: "LRD", 11: "LWR", 12: "LRW"}
 needs_wireshark = pytest.mark.skipif(not (which("tshark") and which("capinfos")), reason="no Wireshark")
 
@@ -180,6 +185,88 @@ def test_several_faults_are_all_there_and_hit_cycles_of_their_own(machines: Mach
     recorded = {figure.quantity: figure.recorded for figure in answer.figures}
     shown_as = {fault.shown_as for fault in FAULTS["ethercat"] if fault.name in often}
     assert {recorded[name] for name in shown_as} == {60}
+
+
+@pytest.mark.parametrize("access", ["polled", "burst"])
+def test_motors_without_sync_keep_their_plan_and_show_each_fault(access: str, tmp_path: Path) -> None:
+    plan = busplan.load_profile("can-motors-8", changes={"bus.access": access})
+
+    def recorded(**options: Any) -> busplan.MeasuredAnswer:
+        busplan.emulate(plan, cycles=300, **options).save(tmp_path / "motors.log")
+        return busplan.measured(plan, tmp_path / "motors.log")
+
+    clean = recorded()
+    assert clean.outside == ()
+    assert {figure.verdict for figure in clean.figures} == {None, "within"}
+    for name in (*OF_REQUESTS, "error-frame"):
+        emulated = busplan.emulate(plan, cycles=300, fault={name: None})
+        shown_as = emulated.described[0].shown_as
+        assert (emulated.inside, emulated.unsure) == ((), ())
+        found = recorded(fault={name: None})
+        assert shown_as in {figure.quantity for figure in found.outside}
+    assert {figure.quantity: figure.recorded for figure in recorded(fault={"lost-answer": 7}).figures}[
+        "answers missing"
+    ] == 7
+
+
+def test_a_fault_has_its_place(refused: Refused, tmp_path: Path) -> None:
+    log = str(tmp_path / "any.log")
+    assert "has no SYNC" in refused("emulate", "can-motors-8", "--fault", "late-command", "-o", log)
+    assert "nodes answer no requests" in refused("emulate", "can-servo-8", "--fault", "slow-node", "-o", log)
+    one = ("--set", "bus.nodes=1", "--fault", "slow-host")
+    assert "no next request" in refused("emulate", "can-motors-8", *one, "-o", log)
+
+
+QUEUED = """\
+schema_version = 1
+name = "queues"
+[bus]
+kind = "can"
+bit_rate_kbit_s = 500
+queue = "{}"
+[[message]]
+name = "often"
+identifier = 0x100
+sender = "host"
+payload_bytes = 8
+period_us = 10000
+deadline_us = "none"
+[[message]]
+name = "row"
+identifier = 0x{}00
+sender = "{}"
+payload_bytes = 8
+period_us = 20130
+burst = 10
+deadline_us = "none"
+[[message]]
+name = "last"
+identifier = 0x700
+sender = "host"
+payload_bytes = 8
+period_us = 9970
+deadline_us = "none"
+"""
+
+
+@pytest.mark.parametrize(
+    ("queue", "sender", "least", "most"),
+    [
+        ("priority", "host", 0, 1),
+        ("fifo", "host", 8, 11),
+        ("single-buffer", "host", 0, 1),
+        ("single-buffer", "other", 5, 11),
+    ],
+)
+def test_a_queue_keeps_a_message_waiting(queue: str, sender: str, least: int, most: int, tmp_path: Path) -> None:
+    """A row of ten frames is before a message in a FIFO, and before what is in its single buffer."""
+    text = QUEUED.format(queue, 3, sender).replace('sender = "other"\n', "")
+    (tmp_path / "queues.toml").write_text(text)
+    busplan.emulate(tmp_path / "queues.toml", cycles=2000).save(tmp_path / "queues.log")
+    sent = [frame for frame in logged((tmp_path / "queues.log").read_bytes()) if frame.identifier == 0x100]
+    late_us = [frame.us - sent[0].us - 10_000 * number for number, frame in enumerate(sent)]
+    frame_us = 226
+    assert least * frame_us <= max(late_us) - min(late_us) <= (most + 0.2) * 1.2 * frame_us
 
 
 def test_a_plan_that_does_not_fit_is_emulated_as_it_is(tmp_path: Path) -> None:
@@ -494,8 +581,13 @@ def test_the_help_names_all_faults() -> None:
         (("can-servo-8", "--fault", "jitter=5"), "--fault jitter 5: expected a time with its unit"),
         (("can-servo-8", "--fault", "missing-pdo=0"), "expected a whole number from 1"),
         (("can-servo-8", "--cycles", "10", "--fault", "missing-pdo"), "it takes a quarter at most"),
-        (("can-servo-8", "--cycles", "10", "--duration", "1s"), "give one of them"),
-        (("can-servo-8", "--cycles", "0"), "cycles 0: expected a whole number from 1"),
+        (("can-servo-8", "--cycles", "10", "--duration", "1s"), "--cycles and --duration: give one of them"),
+        (("can-servo-8", "--cycles", "0"), "--cycles 0: expected a whole number from 1"),
+        (("can-servo-8", "--duration", "0s"), "--duration 0 us: expected a recording of 1 to 1,000,000 cycles of 4000"),
+        (
+            ("can-servo-8", "--fault", "jitter=100s"),
+            "--fault jitter: 100000000 us; expected a time below that of the recording, 4000000 us",
+        ),
         (("can-servo-8", "--seed", "0"), "seed 0: expected a whole number from 1"),
         (("can-servo-8", "--cycles", "1000000"), "a recording has up to 500,000: give fewer cycles"),
         (("ethercat-servo-8", "--duration", "1000s"), "a recording has up to 500,000: give fewer cycles"),

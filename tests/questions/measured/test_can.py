@@ -154,8 +154,11 @@ def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path:
     logged += [Logged(50.0, 0x181, b"", True, 0)]
     answer = of_log(candump(sorted(logged)), tmp_path)
     unseen = figure(answer, "frames of the plan never in the log")
-    assert (unseen.hidden, unseen.verdict) == ("never in the log: 1 of feedback, sdo-request, heartbeats", "not shown")
-    assert figure(answer, "PDOs missing").note == "299 of 0x183"
+    assert (unseen.hidden, unseen.verdict) == (
+        "never in the log: feedback of node 3 (0x183), sdo-request, heartbeats",
+        "not shown",
+    )
+    assert figure(answer, "PDOs missing").note == "299 of feedback of node 3 (0x183)"
     unplanned = figure(answer, "frames of no message")
     # 0x181 of 29 bits is not the feedback of 11.
     assert (unplanned.recorded, unplanned.note, unplanned.verdict) == (21, "0x181, 0x7fe, 0x7ff", "outside")
@@ -179,7 +182,7 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     assert figure(of_log(candump(arbitrated(late)), tmp_path), "last PDO").verdict == "not shown"
     plan = busplan.load_profile(PLAN, changes={"node.execution.grade": "measured"})
     answer = of_log(candump(arbitrated(late)), tmp_path, plan=plan)
-    assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC"]
+    assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC", "command: response"]
 
 
 def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
@@ -378,3 +381,52 @@ def test_steps_of_stamps_are_said(tmp_path: Path) -> None:
     words = "Stamps have steps of 10 us."
     assert [words in of_log(candump(one), tmp_path).remarks for one in (logged, coarse)] == [False, True]
     assert not any("steps of" in remark for remark in of_log(candump(logged), tmp_path).remarks)
+
+
+def test_a_pdo_outside_its_own_bound_is_outside_even_where_the_cycle_fits(tmp_path: Path) -> None:
+    """A plan of 10 ms: its feedback may take 1,470 us, and one of the eighth node takes some 6,500."""
+    plan = busplan.load_profile(PLAN, changes={"cycle.period_us": 10_000, "node.execution.grade": "measured"})
+    late = 40
+    queued = [
+        Queued(cycle * 10_000.0 + 150 + 6200 * (node == 8 and cycle == late), 0x180 + node, bytes(8))
+        for cycle in range(100)
+        for node in range(1, 9)
+    ]
+    queued += [Queued(cycle * 10_000.0 + 9000, 0x200 + node, bytes(8)) for cycle in range(100) for node in range(1, 9)]
+    logged = arbitrated([*queued, *(Queued(cycle * 10_000.0, 0x80, b"") for cycle in range(101))])
+    answer = of_log(candump(logged), tmp_path, plan=plan)
+    feedback, worst_us = figure(answer, "feedback: response"), 6200 + 150
+    (at,) = (
+        place for place, frame in enumerate(logged) if frame.identifier == 0x188 and frame.queued.us % 10_000 > 6000
+    )
+    assert feedback.recorded == pytest.approx(worst_us, abs=300)
+    assert (feedback.verdict, feedback.note) == ("outside", "the latest: feedback of node 8 (0x188)")
+    assert (feedback.first_frame, feedback.worst_frame) == (at + 1, at + 1)
+    assert feedback.first_s == pytest.approx((logged[at].us - logged[0].us) / 1e6, abs=2e-6)
+    assert feedback.first_words in answer.to_text()
+
+
+def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:
+    """CiA 301: 0x80 and the node-ID; error code, the lower byte first, error register, five bytes of the maker."""
+    more = [
+        (100_000.0, 0x83, "308111AABBCCDDEE"),
+        (200_000.0, 0x83, "308111AABBCCDDEF"),
+        (300_000.0, 0x83, "0000000000000000"),
+        (400_000.0, 0xA0, "1043800000000000"),
+        # Of another length, and so none.
+        (500_000.0, 0x84, "3081"),
+    ]
+    logged = [*LOGGED, *(Logged(us, identifier, bytes.fromhex(data), False, 0) for us, identifier, data in more)]
+    logged.sort(key=lambda frame: frame.us)
+    answer = of_log(candump(logged), tmp_path)
+    found, sent_us = figure(answer, "emergencies"), [us for us, *_ in more]
+    places = [place for place, frame in enumerate(logged, start=1) if frame.us in sent_us]
+    times_s = [(us - logged[0].us) / 1e6 for us in sent_us]
+    assert (found.planned, found.recorded, found.verdict, found.key) == (0, 3, "outside", "limits.missed_cycles")
+    assert found.note.split("; ") == [
+        f"node 3: error 0x8130, register 0x11, 2 times, first at {times_s[0]:.6f} s, frame {places[0]}",
+        f"node 3: no error any more at {times_s[2]:.6f} s, frame {places[2]}",
+        f"node-ID 32: error 0x4310, register 0x80 at {times_s[3]:.6f} s, frame {places[3]}",
+    ]
+    assert (found.first_frame, found.worst_frame) == (places[0], places[0])
+    assert figure(answer, "frames of no message").note == "0x84"

@@ -77,16 +77,17 @@ def test_a_machine_within_its_plan_has_no_finding(tmp_path: Path) -> None:
 
 def test_commands_late_beyond_the_next_sync_are_told_by_their_own(tmp_path: Path) -> None:
     late = errors(machine(late_us=lambda cycle, frame: 3300.0 * (frame > 0x200 and cycle % 33 == 5)), tmp_path)
-    (words,) = late
-    assert late[words] == "BP401"
-    assert words.startswith("last PDO after SYNC: 4")
+    assert set(late.values()) == {"BP401"}
+    named = ["fast command: response", "last PDO after SYNC", "slow command: response"]
+    assert sorted(words.partition(": 4")[0] for words in late) == named
 
 
 def test_commands_late_in_one_of_ten_due_cycles_are_told(tmp_path: Path) -> None:
     # Of every fourth SYNC: late by more than a cycle, and still before they are due again.
     late = errors(machine(late_us=lambda cycle, frame: 5000.0 * (frame == 0x203 and cycle % 40 == 0)), tmp_path)
-    (words,) = late
-    assert words.startswith("last PDO after SYNC: 57"), words
+    of_cycle, of_commands = late
+    assert of_cycle.startswith("last PDO after SYNC: 57"), of_cycle
+    assert "(the latest: command of slow 1 (0x203))" in of_commands
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,9 @@ def test_what_a_bus_sent_is_found_again_with_its_moments(seed: int, tmp_path: Pa
     assert found.load == pytest.approx(wire_us / (sent[-1][1].us - sent[0][1].us), rel=1e-5)
     gap = max(itertools.pairwise(sent), key=lambda pair: pair[1][1].us - pair[0][1].us)
     assert found.largest_gap_us == pytest.approx(gap[1][1].us - gap[0][1].us, abs=1.1)
+    assert found.largest_gap_frame == gap[1][0]
     start_us = sent[0][1].us
+    assert found.largest_gap_s == pytest.approx((gap[1][1].us - start_us) / 1e6, abs=2e-6)
     places = sorted(errors)
     assert (found.first_error_frame, found.last_error_frame) == (places[0] + 1, places[-1] + 1)
     assert found.first_error_s == pytest.approx((logged[places[0]].us - start_us) / 1e6, abs=2e-6)
@@ -75,6 +77,7 @@ def test_emergencies_have_node_code_register_and_moment(tmp_path: Path) -> None:
         (20_500, 3, b"\x10\x82\x11"),
         (40_500, 3, bytes(3)),
         (50_500, 9, b"\0\x43\4"),
+        (60_500, 3, b"\x11\x82\x10"),
     ]
     queued += [Queued(us, 0x80 + node, data + bytes(5)) for us, node, data in faults]
     found = of_log(arbitrated(queued), tmp_path)
@@ -82,8 +85,9 @@ def test_emergencies_have_node_code_register_and_moment(tmp_path: Path) -> None:
         (one.node, one.error_code, one.register, one.messages, one.first_frame, one.last_frame)
         for one in found.emergencies
     ]
-    assert shown == [(3, 0x8210, 0x11, 2, 12, 23), (3, 0, 0, 1, 44, 44), (9, 0x4300, 4, 1, 55, 55)]
-    assert [one.first_s for one in found.emergencies] == pytest.approx([0.0106, 0.0406, 0.0506], abs=1e-4)
+    once = [(3, 0, 0, 1, 44, 44), (9, 0x4300, 4, 1, 55, 55), (3, 0x8211, 0x10, 1, 66, 66)]
+    assert shown == [(3, 0x8210, 0x11, 2, 12, 23), *once]
+    assert [one.first_s for one in found.emergencies] == pytest.approx([0.0106, 0.0406, 0.0506, 0.0606], abs=1e-4)
 
 
 def test_a_log_that_is_not_canopen_gets_no_names(tmp_path: Path) -> None:

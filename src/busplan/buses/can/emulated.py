@@ -12,7 +12,7 @@ from busplan.buses.can.streams import Stream, place, streams
 from busplan.buses.can.traffic import HOST, NODE, NOT_BY_PRIORITY, SYNC, traffic_of
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Group, Network
-from busplan.errors import BusplanError
+from busplan.errors import ArgumentError
 from busplan.recordings.can import written_bits
 from busplan.recordings.written import candump
 
@@ -106,8 +106,6 @@ class _Machine:
         cycles = range(emulation.cycles - int(max((pdos.every for pdos in self.traffic.pdos), default=1)))
         due = {name: [cycle for cycle in cycles if self._due(name, cycle)] for name in ("feedback", "command")}
         among = {SILENT: due["feedback"], TWICE: due["feedback"], LATE: due["command"]}
-        fastest = int(min((pdos.every for pdos in self.traffic.pdos), default=1))
-        among |= {fault: [cycle for cycle in cycles if not cycle % fastest] for fault in _OF_REQUESTS}
         self.hit = {fault: emulation.drawn(fault, among.get(fault, cycles)) for fault in FAULTS}
         self.left: dict[int, int] = {}
         """Feedback frames that have not arrived, by cycle."""
@@ -127,7 +125,7 @@ class _Machine:
             none, known = f'bus.access = "{bus.access}" has no SYNC', _OF_REQUESTS
         others = [name for name in self.emulation.faults if name not in {fault.name for fault in (*known, ERRORS)}]
         if others:
-            raise BusplanError(f"fault {min(others)}: {none}")
+            raise ArgumentError(f"fault {min(others)}: {none}")
 
     def _senders(self, stream: Stream, unstuffed: Stream) -> Iterator[_Sender]:
         """Senders of a stream, which is also given without stuff bits: one an identifier, with random data."""
@@ -244,12 +242,16 @@ class _Machine:
         coming, waiting = list(self._alone()), list[tuple[int, int, _Sender, int]]()
         heapify(coming)
         errors = sorted(self.hit[ERRORS])
-        now_us = 0.0
-        while coming or waiting:
-            now_us = now_us if waiting else max(now_us, coming[0][0])
+        now_us, free = 0.0, ""
+        while coming or waiting or free:
+            now_us = now_us if waiting or free else max(now_us, coming[0][0])
             while coming and coming[0][0] <= now_us:
                 _, running, sender, number = heappop(coming)
                 self._offer(waiting, (sender.order, running, sender, number))
+            if free:
+                self._next_of(waiting, free)
+                free = ""
+                continue
             _, running, sender, number = heappop(waiting)
             is_counter = sender.stream.name == SYNC
             frame, wire_us = (
@@ -260,8 +262,8 @@ class _Machine:
                 del errors[0]
                 frame, wire_us = _ERROR, wire_us / 2 + (c.ERROR_BITS * bit_us(self.traffic.bit_rate_kbit_s))
                 heappush(waiting, (sender.order, running, sender, number))
-            elif sender.queue:
-                self._next_of(waiting, sender.queue)
+            else:
+                free = sender.queue
             now_us += wire_us
             if now_us >= self.end_us:
                 return
@@ -300,12 +302,10 @@ class _Requests(_Machine):
             yield _Node(group, requests, answers)
 
     def _place(self, fault: Fault) -> int:
-        """Number of the node that a fault hits: the second one of the fastest group, where there are several."""
-        fastest = min(int(node.group.every) for node in self.nodes)
-        places = [number for number, node in enumerate(self.nodes) if int(node.group.every) == fastest]
-        if fault is SLOW_HOST and fault.name in self.emulation.faults and len(places) < 2:  # noqa: PLR2004
-            raise BusplanError(f"fault {fault.name}: there is one node, and no next request in its cycle")
-        return places[min(1, len(places) - 1)]
+        """Number of the node that a fault hits: the second one, where there are several."""
+        if fault is SLOW_HOST and fault.name in self.emulation.faults and len(self.nodes) == 1:
+            raise ArgumentError(f"fault {fault.name}: there is one node, and no next request in its cycle")
+        return min(1, len(self.nodes) - 1)
 
     def _is_hit(self, fault: Fault, number: int, cycle: int) -> bool:
         return self.hit_place[fault] == number and cycle in self.hit[fault]
@@ -318,9 +318,8 @@ class _Requests(_Machine):
         for cycle in range(self.emulation.cycles):
             queued_us = cycle * self.period_us
             for number, node in enumerate(self.nodes):
-                if not cycle % int(node.group.every):
-                    queued_us += self._host_us(number, cycle)
-                    yield from self._sent(node.requests, "command", number, cycle, queued_us)
+                queued_us += self._host_us(number, cycle)
+                yield from self._sent(node.requests, "command", number, cycle, queued_us)
 
     def _host_us(self, number: int, cycle: int) -> float:
         """Time that the host takes for a request [us]."""
@@ -334,9 +333,7 @@ class _Requests(_Machine):
         yield from (self._at(queued_us, sender, cycle) for sender in senders)
 
     def _request(self, number: int, cycle: int, now_us: float) -> Iterator[_Queued]:
-        """The request to the next node that is due in a cycle; behind the last one the next cycle begins."""
-        while number < len(self.nodes) and cycle % int(self.nodes[number].group.every):
-            number += 1
+        """The request to the next node of a cycle; behind the last one the next cycle begins."""
         if number < len(self.nodes):
             queued_us = now_us + self._host_us(number, cycle)
             yield from self._sent(self.nodes[number].requests, "command", number, cycle, queued_us)

@@ -26,6 +26,8 @@ _SPACE_BITS: Final = 3
 """Bits between two frames (ISO 11898-1), which a stamp at the end of a frame may leave out."""
 _MOST: Final = 0.5
 """Share of the times of a node that no other frame may hide, at least, so that they show its execution time [1]."""
+_MOST_OF_CYCLE: Final = 0.9
+"""Time without a request in a cycle of requests at once, at most, as a share of the period [1]."""
 _NOTHING: Final[Places] = np.zeros(0, dtype=np.int64)
 
 
@@ -90,11 +92,13 @@ class RequestLog:
         """Largest error of a time from the end of one frame to the start of another [us]."""
         rates = {"bit_rate_kbit_s": self.traffic.bit_rate_kbit_s}
         rates["data_bit_rate_kbit_s"] = self.traffic.data_bit_rate_kbit_s
-        self.wire_us = wire_times(frames, stretch.taken, **rates).us
+        self.wire_us, worst_us, none_us = wire_times(frames, stretch.taken, **rates)
+        # The stuff bits of CAN FD are not known.
+        unknown_us = (worst_us - none_us)[frames.is_fd[stretch.taken]] / 2
+        self.error_us += float(unknown_us.max(initial=0.0))
         self.starts_us = self.times_us - self.wire_us
-        bits = np.where(frames.extended[stretch.taken], 29, BASE_BITS)
-        pairs = zip(frames.identifiers[stretch.taken].tolist(), bits.tolist(), strict=True)
-        self.order = np.array([place(*pair) for pair in pairs], dtype=np.int64)
+        identifiers, is_extended = frames.identifiers[stretch.taken], frames.extended[stretch.taken]
+        self.order = np.where(is_extended, place(identifiers, 29), place(identifiers, BASE_BITS))
         self._position = np.zeros(len(frames.times_us), dtype=np.int64)
         self._position[stretch.taken] = np.arange(len(stretch.taken))
         self._by_identifier = by_identifier
@@ -190,13 +194,14 @@ class RequestLog:
         )
         order = np.argsort(last, kind="stable")
         node, first, last, end = node[order], first[order], last[order], end[order]
-        apart_us = np.diff(self.times_us[last])
+        apart_us, ahead = np.diff(self.times_us[last]), np.diff(node)
         period_us = self.traffic.period_us
         if self.traffic.access == "burst":
             terms = self.cycle.by_term
-            begins = apart_us > (period_us - terms["cycle_host_us"] - terms["cycle_command_us"]) / 2
+            pause_us = (period_us - terms["cycle_host_us"] - terms["cycle_command_us"]) / 2
+            begins = ((ahead <= 0) & (apart_us > pause_us)) | (apart_us > _MOST_OF_CYCLE * period_us)
+            begins[_repeats(node, self.times_us[last], begins, least_us=period_us / 2)] = True
         else:
-            ahead = np.diff(node)
             begins = (ahead < 0) | ((ahead == 0) & (apart_us > period_us / 2))
         return _Requests(node, first, last, end, np.concatenate(([0], np.cumsum(begins))))
 
@@ -226,8 +231,8 @@ class RequestLog:
         opened = np.zeros(len(cycles), dtype=np.int64)
         opened[periods.places] = requests.first[opening]
         due, missing, twice = 0, list[Places](), list[Places]()
-        for node, found in zip(self.nodes, self.found, strict=True):
-            sent = due_pdos(grid_us, self.times_us[found.last], every=int(node.group.every), is_sent=is_sent)
+        for found in self.found:
+            sent = due_pdos(grid_us, self.times_us[found.last], every=1, is_sent=is_sent)
             due += sent.due
             missing.append(opened[sent.missing])
             twice.append(found.last[sent.twice])
@@ -292,7 +297,7 @@ class RequestLog:
                 continue
             worst = quantile(found.least_us, self.share)
             doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
-            key, count = node.group.key("execution"), len(found.least_us)
+            key, count = node.group.key("execution.worst_extra_us"), len(found.least_us)
             quantity, note = f"{node.name}: request to answer", _median(found.least_us, found.is_exact)
             figure = RecordedFigure(quantity, "us", node.planned_us, worst.value, doubt_us, "at most", count, key, note)
             figures.append(self._located(figure, found.begin, found.least_us))
@@ -315,24 +320,31 @@ class RequestLog:
             return
         median_us = round(float(np.median(least_us[is_exact])), 1)
         worst_us = quantile(least_us, self.share).value
-        values = {
+        values: dict[str, Any] = {
             "kind": "linear",
             "base_us": median_us,
             "per_byte_us": 0.0,
-            "payload_bytes": None,
-            "time_us": None,
             "grade": "measured",
             "uncertainty_us": round(self.error_us / 2, 2),
             "worst_extra_us": max(ceil(10 * (worst_us - median_us)) / 10, 0.0),
         }
+        if group.node.execution.kind == "table":
+            values |= {"payload_bytes": None, "time_us": None}
         for member in group.members:
             self.edits |= {f"{member.node_key('execution')}.{key}": value for key, value in values.items()}
 
     def _host(self, requests: "_Requests") -> Iterator[RecordedFigure]:
-        """The host's time to its next request: behind the answer before, of requests at once behind the one before."""
-        floors = (requests.last if self.traffic.access == "burst" else requests.end)[:-1]
-        is_next = (requests.cycle[1:] == requests.cycle[:-1]) & (floors >= 0) & (floors < requests.first[1:])
-        floors, first = floors[is_next], requests.first[1:][is_next]
+        """The host's time to its next request: behind the answer before, of requests at once behind the one before.
+
+        Of these the host has queued all frames of one before the next, whatever the order in which they go.
+        """
+        order = np.arange(len(requests.node))
+        if self.traffic.access == "burst":
+            order = np.lexsort((requests.node, requests.cycle))
+        node, cycle, first = requests.node[order], requests.cycle[order], requests.first[order]
+        floors = (first if self.traffic.access == "burst" else requests.end)[:-1]
+        is_next = (cycle[1:] == cycle[:-1]) & (node[1:] == node[:-1] + 1) & (floors >= 0) & (floors < first[1:])
+        floors, first = floors[is_next], first[1:][is_next]
         quantity = "next request of the host"
         if not len(first):
             return
@@ -352,6 +364,23 @@ class RequestLog:
                 "bus.host_grade": "measured",
                 "bus.host_uncertainty_us": round(doubt_us / 2, 2),
             }
+
+
+def _repeats(nodes: Places, times_us: Floats, begins: npt.NDArray[np.bool_], *, least_us: float) -> Places:
+    """Requests but the first that come again in a cycle, some of which begin where known, after some time or more.
+
+    A cycle begins there, too; a node that gets its request again sooner gets it twice.
+    """
+    seen_us, repeats = {int(nodes[0]): float(times_us[0])}, list[int]()
+    rows = zip(nodes[1:].tolist(), times_us[1:].tolist(), begins.tolist(), strict=True)
+    for number, (node, us, begin) in enumerate(rows):
+        is_again = not begin and us - seen_us.get(node, us) > least_us
+        if is_again:
+            repeats.append(number)
+        if begin or is_again:
+            seen_us.clear()
+        seen_us.setdefault(node, us)
+    return np.array(repeats, dtype=np.int64)
 
 
 def _median(us: Floats, is_exact: npt.NDArray[np.bool_]) -> str:

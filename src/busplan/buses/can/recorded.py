@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, isfinite
+from math import ceil, inf, isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ from busplan.buses.can.recorded_cycles import (
     SentPdos,
     emergencies,
     joined,
-    last_pdos,
+    last_pdos_us,
     pdos_beside_sync,
 )
 from busplan.buses.can.requests import RequestCycle
@@ -32,7 +32,16 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, lateness, periodic_events, quantile
+from busplan.recordings.statistics import (
+    LEAST_EVENTS,
+    Floats,
+    ahead,
+    expanded,
+    lateness,
+    periodic_events,
+    policed,
+    quantile,
+)
 
 _NOT_SHOWN: Final = "A log does not show the bit rate, frames that the recorder missed, when a frame was queued"
 _BESIDE_SYNC: Final = ", commands that are always late by whole periods, or the nodes' own time"
@@ -200,45 +209,45 @@ class _Log:
         yield self._located(figure, sent.frames[before], without)
         self.pdos += pdos_beside_sync(sent, periods, sync.period_us, self.senders, self.by_identifier)
         due = sum(pdos.due for pdos in self.pdos)
-        for name in ("missing", "twice"):
-            lost = {pdos.name: getattr(pdos, name) for pdos in self.pdos}
+        for sort in ("missing", "twice"):
+            lost = {pdos.name: getattr(pdos, sort) for pdos in self.pdos}
             notes = [f"{len(frames):,} of {name}" for name, frames in lost.items() if len(frames)]
-            frames = joined(lost.values())
-            figure = self._missed(f"PDOs {name}", len(frames), due, note=first_of(notes, can_timing.LISTED))
             # Several may be missing at one SYNC.
-            frames, number = np.unique(frames, return_counts=True)
+            frames, number = np.unique(joined(lost.values()), return_counts=True)
+            figure = self._missed(f"PDOs {sort}", int(number.sum()), due, note=first_of(notes, can_timing.LISTED))
             yield self._located(figure, frames, number.astype(np.float64))
-        late_us, frames = last_pdos(self.pdos)
-        if len(late_us):
-            behind = quantile(late_us, self.share)
-            figure = RecordedFigure(
-                "last PDO after SYNC",
-                "us",
-                # From a SYNC as it came, late or not.
-                _finite(self._last_us),
-                behind.value,
-                self._with_stamps(*(doubt.us for doubt in self.cycle.doubts()), behind.uncertainty or 0.0),
-                "at most",
-                len(late_us),
-                _PERIOD,
-                self._latest(self.pdos),
-            )
-            yield self._located(figure, frames, late_us)
+        doubts = tuple(doubt.us for doubt in self.cycle.doubts())
+        yield from self._after_sync("last PDO after SYNC", self.pdos, self._last_us, doubts, _PERIOD)
 
     @property
     def _last_us(self) -> float:
-        """Time that a cycle takes from SYNC on, by the plan [us]."""
+        """Time that a cycle takes from SYNC on, late or not, by the plan [us]."""
         return float(self.cycle.required_us - self.network.nonperiodic_us - self.traffic.sync_jitter_us)
 
-    @staticmethod
-    def _latest(some: Iterable[SentPdos]) -> str:
-        """The PDO that comes latest after its SYNC, by its name with the node, as a note."""
-        latest = max((pdos for pdos in some if len(pdos.late_us)), key=lambda pdos: float(pdos.late_us.max()))
-        return f"the latest: {latest.name}"
+    def _after_sync(
+        self, quantity: str, some: Sequence[SentPdos], planned_us: float, doubts: Iterable[float], key: str
+    ) -> Iterator[RecordedFigure]:
+        """Time of the last of some PDOs of each cycle after SYNC; `doubts` are standard uncertainties [us]."""
+        if not any(len(pdos.frames) for pdos in some):
+            return
+        last_us = last_pdos_us(some)
+        latest = quantile(last_us, self.share)
+        figure = RecordedFigure(
+            quantity,
+            "us",
+            _finite(planned_us),
+            latest.value,
+            self._with_stamps(*doubts, latest.uncertainty or 0.0),
+            "at most",
+            len(last_us),
+            key,
+            f"the latest: {max(some, key=lambda pdos: pdos.late_us.max(initial=0.0)).name}",
+        )
+        yield self._located(figure, joined(pdos.frames for pdos in some), joined(pdos.late_us for pdos in some))
 
     def _emergencies(self) -> Iterator[RecordedFigure]:
         """Emergencies of nodes, where a network of CANopen has any."""
-        if not self.traffic.has_sync or self.senders.sent[0].first != EMERGENCY:
+        if not self.senders.by_node_id or self.senders.sent[0].first != EMERGENCY:
             return
         cyclic = {identifier for _, identifier in self.senders.pdos()}
         others = (sent.frames for sent in self.by_identifier.values() if sent.identifier not in cyclic)
@@ -248,16 +257,7 @@ class _Log:
         for identifier in np.unique(self.frames.identifiers[found.frames]).tolist():
             self.unplanned.pop((identifier, False), None)
         is_error = found.codes != 0
-        notes = []
-        for node, code, register in sorted({*zip(*(part.tolist() for part in found[1:]), strict=True)}):
-            alike = (found.nodes == node) & (found.codes == code) & (found.registers == register)
-            events = self.frames.events(np.ones(int(alike.sum())), found.frames[alike])
-            at_s, frame = events.earliest(events.values > 0)
-            times = f", {plural(len(events.values), 'time')}, first" if len(events.values) > 1 else ""
-            words = f"error {code:#06x}, register {register:#04x}" if code else "no error any more"
-            name = self.senders.by_node_id.get(node, f"node-ID {node}")
-            notes.append((frame, f"{name}: {words}{times} at {at_s:.6f} s, frame {frame}"))
-        note = first_of([words for _, words in sorted(notes)], can_timing.LISTED)
+        note = first_of(found.words(self.frames, self.senders.by_node_id), can_timing.LISTED, by="; ")
         figure = self._missed("emergencies", int(is_error.sum()), len(found.frames), note=note)
         yield self._located(figure, found.frames[is_error])
 
@@ -269,32 +269,19 @@ class _Log:
         if stream.is_message:
             yield from self._message_response(stream, quantity, shortest_us, phases)
             return
-        sent = [pdos for pdos in self.pdos if pdos.stream == stream and len(pdos.late_us)]
+        sent = [pdos for pdos in self.pdos if pdos.stream == stream]
         if not sent:
             return
         group = next(group for group in self.network.groups if group.name == stream.group)
         if stream.name == NAMES["read"]:
             planned_us = group.read_execution_us + group.worst_extra_us + phases["worst_response_us"]
-            key, doubts = group.key("execution"), (group.read_uncertainty_us,)
-        else:
-            # Behind the last command only the slowest execution follows.
-            slowest_us = max(group.write_execution_us + group.worst_extra_us for group in self.network.groups)
-            planned_us = self._last_us - slowest_us
-            key, doubts = _PERIOD, tuple(doubt.us for doubt in self.cycle.doubts())
-        late_us = joined(pdos.late_us for pdos in sent)
-        latest = quantile(late_us, self.share)
-        figure = RecordedFigure(
-            quantity,
-            "us",
-            _finite(planned_us),
-            latest.value,
-            self._with_stamps(*doubts, latest.uncertainty or 0.0),
-            "at most" if isfinite(planned_us) else "shown",
-            len(late_us),
-            key,
-            self._latest(sent),
-        )
-        yield self._located(figure, joined(pdos.frames for pdos in sent), late_us)
+            doubts: tuple[float, ...] = (group.read_uncertainty_us,)
+            yield from self._after_sync(quantity, sent, planned_us, doubts, group.key("execution"))
+            return
+        # Behind the last command only the slowest execution follows.
+        slowest_us = max(group.write_execution_us + group.worst_extra_us for group in self.network.groups)
+        doubts = tuple(doubt.us for doubt in self.cycle.doubts())
+        yield from self._after_sync(quantity, sent, self._last_us - slowest_us, doubts, _PERIOD)
 
     def _message_response(
         self, stream: Stream, quantity: str, shortest_us: float, phases: Mapping[str, Any]
@@ -383,7 +370,7 @@ class _Log:
         yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
         if spread_us is not None:
             late = lateness(periods, self.share)
-            doubt_us = self._with_stamps(late.uncertainty or 0.0)
+            doubt_us = self._with_stamps(late.uncertainty)
             quantity = "SYNC: jitter of the arrival"
             key = "bus.sync_jitter_us"
             jitter = RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count, key)
@@ -448,7 +435,8 @@ class _Log:
             f"{key}.jitter_us",
             identifier(sent),
         )
-        yield self._located(jitter, sent.frames, ahead(sent.times_us, least_us))
+        most_us = inf if jitter.verdict != "outside" or spread_us is None else spread_us
+        yield self._located(jitter, sent.frames, policed(sent.times_us, least_us, most_us))
         if jitter.verdict == "outside":
             model = can_timing.event_model(
                 sent.times_us, planned_us, stamp_error_us=self.stamp_error_us, tolerance=float(CLOCK_TOLERANCE)

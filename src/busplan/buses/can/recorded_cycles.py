@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain
+from math import inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from busplan.buses.can.equations import BASE_BITS
 from busplan.buses.can.streams import Stream
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
+from busplan.english import plural
 from busplan.recordings.can import CanFrames
 from busplan.recordings.can_timing import SentFrames
 from busplan.recordings.statistics import Floats, PeriodicEvents
@@ -78,7 +80,7 @@ class Senders:
         return {
             identifier & _NODE_IDS[-1]: self.node(stream, identifier - stream.first)
             for stream, identifier in self.pdos()
-            if identifier in _OF_NODES
+            if identifier in _OF_NODES and stream.identifier_bits == BASE_BITS
         }
 
 
@@ -131,12 +133,12 @@ def pdos_beside_sync(
         )
 
 
-def last_pdos(pdos: Sequence[SentPdos]) -> tuple[Floats, Ints]:
-    """Time of the last PDO of each cycle after its SYNC [us], and its index in the log; of cycles that have one."""
-    cycles, late_us, frames = (joined(getattr(sent, name) for sent in pdos) for name in ("cycles", "late_us", "frames"))
-    order = np.lexsort((late_us, cycles))
-    last = order[np.diff(cycles[order], append=-1) != 0]
-    return late_us[last], frames[last]
+def last_pdos_us(pdos: Sequence[SentPdos]) -> Floats:
+    """Time of the last PDO of each cycle after its SYNC, of the cycles that have one [us]."""
+    cycles, late_us = joined(sent.cycles for sent in pdos), joined(sent.late_us for sent in pdos)
+    behind_us = np.full(int(cycles.max(initial=-1)) + 1, -inf)
+    np.maximum.at(behind_us, cycles, late_us)
+    return behind_us[behind_us >= 0]
 
 
 def joined(parts: Iterable[npt.NDArray[np.generic]]) -> npt.NDArray[Any]:
@@ -155,6 +157,22 @@ class Emergencies(NamedTuple):
     """Error code of each; 0 says that an error is gone."""
     registers: Ints
     """Error register of each."""
+
+    def words(self, frames: CanFrames, names: Mapping[int, str]) -> list[str]:
+        """Node, error code and register of those that are alike, and when the first of them came, in this order.
+
+        Nodes without a name are called by their node-ID.
+        """
+        found = []
+        for node, code, register in {*zip(*(part.tolist() for part in self[1:]), strict=True)}:
+            alike = (self.nodes == node) & (self.codes == code) & (self.registers == register)
+            events = frames.events(np.ones(np.count_nonzero(alike)), self.frames[alike])
+            at_s, frame = events.earliest(events.values > 0)
+            often = f", {plural(len(events.values), 'time')}, first" if len(events.values) > 1 else ""
+            words = f"error {code:#06x}, register {register:#04x}" if code else "no error any more"
+            name = names.get(node, f"node-ID {node}")
+            found.append((at_s, frame, f"{name}: {words}{often} at {at_s:.6f} s, frame {frame}"))
+        return [words for *_, words in sorted(found)]
 
 
 def emergencies(frames: CanFrames, some: Ints) -> Emergencies:

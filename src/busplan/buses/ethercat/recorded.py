@@ -24,7 +24,7 @@ from busplan.buses.ethercat.frames import (
     housekeeping_bytes,
 )
 from busplan.buses.ethercat.port_times import line_delays
-from busplan.buses.ethercat.recorded_cycles import Ints, SeenCycles, seen_cycles
+from busplan.buses.ethercat.recorded_cycles import Ints, SeenCycles, seen_cycles, trips
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.english import plural
@@ -32,7 +32,17 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.capture import MOST_PACKETS
 from busplan.recordings.ethercat import COMMANDS, Datagram, EthercatFrames, read_ethercat
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, Quantile, expanded, lateness, line, quantile, step
+from busplan.recordings.statistics import (
+    LEAST_EVENTS,
+    Floats,
+    Lateness,
+    Quantile,
+    expanded,
+    lateness,
+    line,
+    quantile,
+    step,
+)
 
 _PERIOD: Final = "cycle.period_us"
 _MASTER: Final = "bus.master_us"
@@ -48,18 +58,6 @@ _BITS: Final = 8
 """Bits of a byte."""
 _STRAY: Final = 0.01
 """Share of frames that may have a wrong stamp or a wrong partner."""
-
-
-class _Trips(NamedTuple):
-    """Frames paired with their return, as indexes into the recording."""
-
-    sent: Ints
-    returned: Ints
-    """Returned frame of each pair."""
-    lost: Ints
-    """Frames that did not return."""
-    unsent: int
-    """Number of returned frames that were not seen when sent."""
 
 
 class _CycleValues(NamedTuple):
@@ -105,7 +103,7 @@ class Seen:
         steps_back = np.diff(frames.times_ns) < -_STEP_BACK_NS
         self.steps_back = int(np.count_nonzero(steps_back))
         self.stamp_us = step(frames.times_ns)
-        self.trips = _trips(frames)
+        self.trips = trips(frames)
         self.trips_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
         self.delays = line_delays(frames.latches, frames.unlatched)
         self.dropped = frames.notes.dropped + frames.cut
@@ -131,7 +129,7 @@ class Seen:
             self.cycles = seen_cycles(sent, times_us, kinds, self.data_bytes[sent], network)
         self.bad_stamps = self._why_bad_stamps()
         """Reason why stamps give no durations; empty where they do."""
-        self.jitter: Quantile | None = None
+        self.jitter: Lateness | None = None
         self.master: Quantile | None = None
         self.master_bytes: list[int] | None = None
         """Data of the master's own datagrams, if not as planned [bytes]."""
@@ -273,7 +271,7 @@ class Seen:
         number, before = missing + len(with_less), np.flatnonzero(cycles.gaps)
         figure = self._missed("cycles without a frame", number, events, ", ".join(notes), self._dropped)
         places = cycles.first[np.concatenate((before, with_less))]
-        each = np.concatenate((cycles.gaps[before], np.ones(len(with_less))))
+        each = np.concatenate((cycles.gaps[before], np.ones(len(with_less), dtype=np.int64))).astype(np.float64)
         return figure.located(self.frames.events(each, places))
 
     def _missed(self, quantity: str, number: int, events: int, note: str, hides: str = "") -> RecordedFigure:
@@ -492,31 +490,3 @@ def _own_reads(network: Network, layouts: Sequence[tuple[Datagram, ...]]) -> fro
 
 def _datagrams_bytes(parts: Sequence[Datagram]) -> float:
     return sum(part.data_bytes + c.DATAGRAM_BYTES for part in parts)
-
-
-def _trips(frames: EthercatFrames) -> _Trips:
-    """Sent frames paired with returned ones.
-
-    Frames keep their order on the ring, so frames with equal datagrams and indexes return in the order in which they
-    were sent. If some were sent in a row and fewer returned before the next was sent, the earliest are lost.
-    """
-    order = np.argsort(frames.key, kind="stable")
-    key, returned = frames.key[order], frames.returned[order]
-    changes = np.flatnonzero((np.diff(key) != 0) | (np.diff(returned.view(np.int8)) != 0)) + 1
-    first = np.concatenate(([0], changes))
-    length = np.diff(np.concatenate((first, [len(order)])))
-    answered = ~returned[first[:-1]] & returned[first[1:]] & (key[first[:-1]] == key[first[1:]])
-    run = np.flatnonzero(answered)
-    sent, back = length[run], length[run + 1]
-    pairs = np.minimum(sent, back)
-    within = np.arange(pairs.sum()) - np.repeat(np.cumsum(pairs) - pairs, pairs)
-    sent_at = order[np.repeat(first[run] + sent - pairs, pairs) + within]
-    back_at = order[np.repeat(first[run + 1], pairs) + within]
-    is_paired = np.zeros(len(order), dtype=np.bool_)
-    is_paired[sent_at] = is_paired[back_at] = True
-    lost = np.flatnonzero(~is_paired & ~frames.returned)
-    # Frames sent after the last return may still be on their way.
-    lost = lost[lost < (back_at.max() if len(back_at) else 0)]
-    unsent = int(np.count_nonzero(~is_paired & frames.returned))
-    kept = frames.times_ns[back_at] >= frames.times_ns[sent_at]
-    return _Trips(sent_at[kept], back_at[kept], lost, unsent)

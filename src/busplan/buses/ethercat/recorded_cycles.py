@@ -1,4 +1,4 @@
-"""Cycles of a capture: the frames of each cycle, and the cycle of the plan that each one is."""
+"""Cycles of a capture: the frames of each cycle, the cycle of the plan that each one is, and frames that return."""
 
 from math import inf, log
 from typing import Any, Final, NamedTuple
@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from busplan.buses.ethercat.frames import UnitCycle, cycles_of
 from busplan.buses.network import Network
+from busplan.recordings.ethercat import EthercatFrames
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, periodic_events
 
 Ints = npt.NDArray[np.int64]
@@ -192,3 +193,43 @@ def _whole(frames: Ints, sort: Ints) -> tuple[int, int]:
     """
     has_less = [frames[end] < np.median(frames[sort == sort[end]]) for end in (0, -1)]
     return int(has_less[0]), len(frames) - int(has_less[1])
+
+
+class Trips(NamedTuple):
+    """Frames paired with their return, as indexes into the recording."""
+
+    sent: Ints
+    returned: Ints
+    """Returned frame of each pair."""
+    lost: Ints
+    """Frames that did not return."""
+    unsent: int
+    """Number of returned frames that were not seen when sent."""
+
+
+def trips(frames: EthercatFrames) -> Trips:
+    """Sent frames paired with returned ones.
+
+    Frames keep their order on the ring, so frames with equal datagrams and indexes return in the order in which they
+    were sent. If some were sent in a row and fewer returned before the next was sent, the earliest are lost.
+    """
+    order = np.argsort(frames.key, kind="stable")
+    key, returned = frames.key[order], frames.returned[order]
+    changes = np.flatnonzero((np.diff(key) != 0) | (np.diff(returned.view(np.int8)) != 0)) + 1
+    first = np.concatenate(([0], changes))
+    length = np.diff(np.concatenate((first, [len(order)])))
+    answered = ~returned[first[:-1]] & returned[first[1:]] & (key[first[:-1]] == key[first[1:]])
+    run = np.flatnonzero(answered)
+    sent, back = length[run], length[run + 1]
+    pairs = np.minimum(sent, back)
+    within = np.arange(pairs.sum()) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    sent_at = order[np.repeat(first[run] + sent - pairs, pairs) + within]
+    back_at = order[np.repeat(first[run + 1], pairs) + within]
+    is_paired = np.zeros(len(order), dtype=np.bool_)
+    is_paired[sent_at] = is_paired[back_at] = True
+    lost = np.flatnonzero(~is_paired & ~frames.returned)
+    # Frames sent after the last return may still be on their way.
+    lost = lost[lost < (back_at.max() if len(back_at) else 0)]
+    unsent = int(np.count_nonzero(~is_paired & frames.returned))
+    kept = frames.times_ns[back_at] >= frames.times_ns[sent_at]
+    return Trips(sent_at[kept], back_at[kept], lost, unsent)

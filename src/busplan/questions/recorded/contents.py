@@ -216,7 +216,9 @@ class _Log:
         return float(wire_us[1:].sum()) / span_us if span_us > 0 else None
 
     def _fullest(self, wire_us: Floats) -> float | None:
-        return can_timing.fullest_load(self.stretch.times_us, wire_us) if self.stretch.length_us > 0 else None
+        return (
+            float(can_timing.second_loads(self.stretch.times_us, wire_us).max()) if self.stretch.length_us > 0 else None
+        )
 
     def contents(self) -> LogContents:
         """All that the log has."""
