@@ -198,7 +198,7 @@ class _CanCycles(RecordedCycles):
             (start_us - self.begin_us) / 1e6,
             self.number_of(first),
             events,
-            self._planned(cycle),
+            self.planned(cycle),
             self._doubts_us(events, cycle, slice(first, last + 1)),
             tuple(self._remarks(cycle)),
         )
@@ -275,7 +275,7 @@ class _CanCycles(RecordedCycles):
         of_row_us, rest_us = self.stamp_error_us, float(stuffing_us.sum())
         return doubts_us | {awaited: rest_us + max(rows[awaited], 1) * of_row_us for awaited in waits}
 
-    def _planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
+    def planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
         """The planned cycle with the groups that are seen, from its first frame to its last one."""
         rates, here = self.cycle.rates, np.flatnonzero(self.cycle_of == cycle).tolist()
         nodes = {self.senders[int(self.key[place])].node for place in here}
@@ -312,7 +312,10 @@ class _Waits:
     def __init__(self, cycles: _CanCycles, cycle: int, first: int) -> None:
         self.cycles, self.has_sync = cycles, cycles.traffic.has_sync
         self.is_burst, bus = cycles.traffic.access == "burst", cycles.network.profile.bus
-        self.host_us = float(bus.host_us)
+        of_host = groupby(cycles.planned(cycle), key=lambda event: event.waits_for in ("host", "adapter"))
+        runs_us = (sum(event.duration_us for event in run) for is_host, run in of_host if is_host)
+        self.host_us = max(runs_us, default=0.0)
+        """Planned time of the host and its adapter before a command."""
         self.waits_for_all = self.has_sync and not bus.pipeline_cycles
         self.left = set(np.flatnonzero(cycles.cycle_of == cycle).tolist())
         """Places of frames that are to come."""

@@ -80,7 +80,9 @@ class _EthercatCycles(RecordedCycles):
         """Events of a cycle."""
         sent = self._sent(place)
         start_us = sent[0].start_us
-        events = from_zero(self._events(sent))
+        planned = self._planned(place)
+        host_us = sum(event.duration_us for event in planned if event.waits_for == "host")
+        events = from_zero(self._events(sent, host_us))
         lost = [frame.number for frame in sent if frame.back_us is None]
         runs = 1 + sum(frame.end_us < after.start_us for frame, after in pairwise(sent))
         stamps_us = self.seen.stamp_us * runs
@@ -91,7 +93,7 @@ class _EthercatCycles(RecordedCycles):
             start_us / 1e6,
             sent[0].number,
             events,
-            self._planned(place),
+            planned,
             doubts_us | ({"unknown": stamps_us} if lost else {}),
             tuple(self._remarks(lost)),
         )
@@ -111,24 +113,25 @@ class _EthercatCycles(RecordedCycles):
             sent.append(_Sent(self._number(frame), start_us, end_us, back_us, self._number(back)))
         return sent
 
-    def _events(self, sent: list[_Sent]) -> Iterator[WaterfallEvent]:
+    def _events(self, sent: list[_Sent], host_us: float) -> Iterator[WaterfallEvent]:
         """Frames one behind the other, and what is waited for between them and at their end [us]."""
         last_us = max(frame.back_us or 0.0 for frame in sent)
         for index, frame in enumerate(sent):
             after = sent[index + 1] if index + 1 < len(sent) else None
             yield WaterfallEvent("wire", f"frame {index + 1}", frame.start_us, frame.end_us, "", frame.number)
             until_us = max(last_us, frame.end_us) if after is None else after.start_us
-            yield from self._gap(frame, after, until_us, index + 1)
+            yield from self._gap(frame, after, until_us, index + 1, host_us)
 
-    def _gap(self, frame: _Sent, after: _Sent | None, until_us: float, index: int) -> Iterator[WaterfallEvent]:
-        """The wait behind a frame, for its return or for the next one."""
+    def _gap(
+        self, frame: _Sent, after: _Sent | None, until_us: float, index: int, host_us: float
+    ) -> Iterator[WaterfallEvent]:
+        """The wait behind a frame, for its return or for the next one; the host's time in the plan is given."""
         now_us, back_us = frame.end_us, frame.back_us
         label = f"return of frame {index}"
         if back_us is None and until_us > now_us:
             yield WaterfallEvent("unknown", f"{label}, which is lost", now_us, until_us, "", frame.number)
             return
         if back_us is not None and now_us < back_us <= until_us:
-            planned_us = float(self.network.profile.bus.master_us)
             ways: tuple[tuple[Awaited, str, float], ...] = (
                 ("wire", "cables", float(cables_us(self.network))),
                 ("nodes", "devices", float(devices_us(self.network) + self.seen.delays.more_us(self.network))),
@@ -139,7 +142,7 @@ class _EthercatCycles(RecordedCycles):
                     yield WaterfallEvent(awaited, name, now_us, end_us, "", frame.back_number)
                     now_us = end_us
             if back_us > now_us:
-                late_us = max(back_us - now_us - planned_us, 0.0)
+                late_us = max(back_us - now_us - host_us, 0.0)
                 yield WaterfallEvent("host", label, now_us, back_us, "", frame.back_number, late_us)
                 now_us = back_us
         if until_us > now_us:
