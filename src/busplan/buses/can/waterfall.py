@@ -14,8 +14,9 @@ from busplan.buses.can.logged import wire_times
 from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, Senders, emergencies
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC, answer_us
-from busplan.buses.network import Network, numbers_by_due
+from busplan.buses.network import Network, hyperperiod, numbers_by_due
 from busplan.buses.waterfall import (
+    MOST_EVENTS,
     Awaited,
     RecordedCycles,
     Waterfall,
@@ -24,7 +25,7 @@ from busplan.buses.waterfall import (
     node_names,
     planned_events,
 )
-from busplan.english import first_of
+from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings import can_timing
@@ -39,6 +40,8 @@ _OTHERS: Final = ("blocking", "message", "repeated")
 """Kinds of planned events that are of other traffic."""
 _FRAMES: Final = ("sync", "feedback_frame", "command_frame")
 """Kinds of planned events that are frames of the cycle."""
+_MOST_CYCLES: Final = 10_000
+"""Longest hyperperiod in which the cycle of the same groups is sought; of a longer one the fullest is shown."""
 _STAMP_US: Final = 1.0
 """Delay of stamps that is no more than the rounding of logs in microseconds."""
 _ROUNDING_US: Final = 1e-6
@@ -75,7 +78,7 @@ class _CanCycles(RecordedCycles):
         self.network, self.frames, self.synthetic = network, frames, frames.synthetic
         self.cycle = can_cycle(network, WORST_STUFFING)
         traffic = self.traffic = self.cycle.traffic
-        stretch = can_timing.longest_stretch(frames)
+        stretch = self.stretch = can_timing.longest_stretch(frames)
         self.taken = stretch.taken
         needed, rate = can_timing.least_bit_rate(frames, stretch).surely, traffic.bit_rate_kbit_s
         if needed > rate:
@@ -187,18 +190,23 @@ class _CanCycles(RecordedCycles):
     def waterfall(self, place: int) -> Waterfall:
         """Events of a cycle."""
         cycle = int(self.cycles[place])
+        planned = self._planned(cycle)
         first, last = int(self.first[cycle]), int(self.last[cycle])
         start_us = float(self.ends_us[first] - self.wire_us[first])
+        if last - first >= MOST_EVENTS:
+            frames = plural(last - first + 1, "frame")
+            raise BusplanError(f"cycle {cycle + 1} has {frames}: a timeline shows up to {MOST_EVENTS:,} events")
+        waits = _Waits(self, cycle, first, planned)
         events = tuple(
             event._replace(start_us=event.start_us - start_us, end_us=event.end_us - start_us)
-            for event in self._events(cycle, first, last)
+            for event in self._events(cycle, first, last, waits)
         )
         return Waterfall(
             self.numbers[place],
             (start_us - self.begin_us) / 1e6,
             self.number_of(first),
             events,
-            self.planned(cycle),
+            planned,
             self._doubts_us(events, cycle, slice(first, last + 1)),
             tuple(self._remarks(cycle)),
         )
@@ -207,9 +215,9 @@ class _CanCycles(RecordedCycles):
         """Number of a frame in the log."""
         return int(self.frames.numbers[self.taken[place]])
 
-    def _events(self, cycle: int, first: int, last: int) -> Iterator[WaterfallEvent]:
+    def _events(self, cycle: int, first: int, last: int, waits: "_Waits") -> Iterator[WaterfallEvent]:
         """Frames and waits of a cycle, at the times of the log [us]."""
-        waits, seen = _Waits(self, cycle, first), set[int]()
+        seen = set[int]()
         pieces: list[tuple[float, float]] = []
         held: list[WaterfallEvent] = []
         now_us = float(self.ends_us[first] - self.wire_us[first])
@@ -275,20 +283,23 @@ class _CanCycles(RecordedCycles):
         of_row_us, rest_us = self.stamp_error_us, float(stuffing_us.sum())
         return doubts_us | {awaited: rest_us + max(rows[awaited], 1) * of_row_us for awaited in waits}
 
-    def planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
+    def _planned(self, cycle: int) -> tuple[WaterfallEvent, ...]:
         """The planned cycle with the groups that are seen, from its first frame to its last one."""
         rates, here = self.cycle.rates, np.flatnonzero(self.cycle_of == cycle).tolist()
         nodes = {self.senders[int(self.key[place])].node for place in here}
         names, ends = node_names(self.network), np.cumsum([int(group.nodes) for group in self.network.groups])
         is_seen = [not nodes.isdisjoint(part) for part in (names[a:b] for a, b in zip((0, *ends), ends, strict=False))]
-        numbers = {due: found[0] for due, found in numbers_by_due(rates).items()}
-        due = min(numbers, key=lambda due: sum(a != b for a, b in zip(due, is_seen, strict=True)))
-        planned = self.cycle.at(numbers[due]) if len(numbers) > 1 else self.cycle
+        planned = self.cycle
+        if 1 < hyperperiod(rates) <= _MOST_CYCLES:
+            numbers = {due: found[0] for due, found in numbers_by_due(rates).items()}
+            due = min(numbers, key=lambda due: sum(a != b for a, b in zip(due, is_seen, strict=True)))
+            planned = self.cycle.at(numbers[due])
         events = [*planned_events(planned.events(), planned.term_figures, others=_OTHERS, names=names)]
         frames = [place for place, (kind, _) in enumerate(events) if kind in _FRAMES]
         return from_zero(event for _, event in events[frames[0] : frames[-1] + 1]) if frames else ()
 
     def _remarks(self, cycle: int) -> Iterator[str]:
+        yield from can_timing.faults(self.frames, self.stretch)
         missing = [self.senders[key].label for role in (_FEEDBACK, _COMMAND) for key in self.missing(cycle, role)]
         if missing:
             yield f"Never came in this cycle: {first_of(missing, can_timing.LISTED)}."
@@ -309,10 +320,10 @@ class _CanCycles(RecordedCycles):
 class _Waits:
     """Waits of a cycle while its frames are gone through."""
 
-    def __init__(self, cycles: _CanCycles, cycle: int, first: int) -> None:
+    def __init__(self, cycles: _CanCycles, cycle: int, first: int, planned: Sequence[WaterfallEvent]) -> None:
         self.cycles, self.has_sync = cycles, cycles.traffic.has_sync
         self.is_burst, bus = cycles.traffic.access == "burst", cycles.network.profile.bus
-        of_host = groupby(cycles.planned(cycle), key=lambda event: event.waits_for in ("host", "adapter"))
+        of_host = groupby(planned, key=lambda event: event.waits_for in ("host", "adapter"))
         runs_us = (sum(event.duration_us for event in run) for is_host, run in of_host if is_host)
         self.host_us = max(runs_us, default=0.0)
         """Planned time of the host and its adapter before a command."""

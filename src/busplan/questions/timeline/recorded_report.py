@@ -1,6 +1,7 @@
 """Report of `timeline` for a recording: two lanes on one scale, the shares of both, and the largest difference."""
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Final
 
 from busplan.buses.waterfall import Awaited, WaterfallEvent
@@ -10,6 +11,8 @@ from busplan.questions.base.sentences import document, fields, with_profile
 from busplan.questions.timeline.recorded import RecordedTimelineAnswer
 
 _DECIMALS: Final = 1
+_MOST_BARS: Final = 400
+"""Most events with a bar each; of more, those of one sort in a row share one."""
 _WORDS: Final[dict[Awaited, str]] = {
     "wire": "wire",
     "nodes": "nodes",
@@ -108,6 +111,11 @@ def _chart(answer: RecordedTimelineAnswer, title: str) -> blocks.Chart:
 
 
 def _spans(answer: RecordedTimelineAnswer, events: Sequence[WaterfallEvent]) -> Iterator[charts.Span]:
+    if len(events) > _MOST_BARS:
+        for awaited, row in groupby(events, key=lambda event: event.waits_for):
+            first, *rest = row
+            yield charts.Span(_ENTRIES[awaited], first.start_us, rest[-1].end_us if rest else first.end_us)
+        return
     for event in events:
         entry = _ENTRIES[event.waits_for]
         wait = f"{_word(answer, event.waits_for)}: "
