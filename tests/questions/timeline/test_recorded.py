@@ -418,6 +418,9 @@ def test_recordings_without_a_cycle_are_refused(folder: Path) -> None:
     path.write_text("(1.0) can0 080#\n(1.1) can0 181#00\n")
     with pytest.raises(BusplanError, match=r"bus\.log: it has no whole cycle: no SYNC comes twice$"):
         busplan.timeline("can-servo-8", recording=path)
+    path.write_text("".join(f"({second}.0) can0 080##1\n" for second in range(1, 4)))
+    with pytest.raises(BusplanError, match=r"^frame 1 of cycle 1 switches to another bit rate, and the plan has none"):
+        busplan.timeline("can-servo-8", recording=path)
     with pytest.raises(BusplanError, match=r"bus\.log: busplan reads no recordings of bus\.kind ieee1394$"):
         busplan.timeline("paper-4ms", recording=path)
     alone = {key: value for key, value in sync_plan(1).items() if key not in ("cycle", "group")}

@@ -195,7 +195,13 @@ class _CanCycles(RecordedCycles):
         start_us = float(self.ends_us[first] - self.wire_us[first])
         if last - first >= MOST_EVENTS:
             frames = plural(last - first + 1, "frame")
-            raise BusplanError(f"cycle {cycle + 1} has {frames}: a timeline shows up to {MOST_EVENTS:,} events")
+            raise BusplanError(f"cycle {cycle + 1:,} has {frames}: a timeline shows up to {MOST_EVENTS:,} events")
+        unknown = np.flatnonzero(self.wire_us[first : last + 1] == 0)
+        if len(unknown):
+            raise BusplanError(
+                f"frame {self.number_of(first + int(unknown[0])):,} of cycle {cycle + 1:,} switches to another "
+                "bit rate, and the plan has none: its length is not known; give bus.data_bit_rate_kbit_s"
+            )
         waits = _Waits(self, cycle, first, planned)
         events = tuple(
             event._replace(start_us=event.start_us - start_us, end_us=event.end_us - start_us)
