@@ -14,6 +14,7 @@ from busplan.buses.can.logged import wire_times
 from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, Senders, emergencies
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC, answer_us
+from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network, hyperperiod, numbers_by_due
 from busplan.buses.waterfall import (
     MOST_EVENTS,
@@ -295,7 +296,7 @@ class _CanCycles(RecordedCycles):
         nodes = {self.senders[int(self.key[place])].node for place in here}
         names, ends = node_names(self.network), np.cumsum([int(group.nodes) for group in self.network.groups])
         is_seen = [not nodes.isdisjoint(part) for part in (names[a:b] for a, b in zip((0, *ends), ends, strict=False))]
-        planned = self.cycle
+        planned: BusCycle = self.cycle
         if 1 < hyperperiod(rates) <= _MOST_CYCLES:
             numbers = {due: found[0] for due, found in numbers_by_due(rates).items()}
             due = min(numbers, key=lambda due: sum(a != b for a, b in zip(due, is_seen, strict=True)))
