@@ -14,7 +14,6 @@ from busplan.buses.can.logged import wire_times
 from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, Senders, emergencies
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC, answer_us
-from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network, hyperperiod, numbers_by_due
 from busplan.buses.waterfall import (
     MOST_EVENTS,
@@ -35,6 +34,8 @@ from busplan.recordings.statistics import Floats, periodic_events
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from busplan.buses.cycle import BusCycle
 
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 _OTHERS: Final = ("blocking", "message", "repeated")
