@@ -10,7 +10,7 @@ TYPED = {
     "can": ("CAN", "Can", "CANopen", "canopen", "CAN 2.0"),
     "ethercat": ("EtherCAT", "ETHERCAT"),
     "sercos3": ("SERCOS III", "sercos 3", "sercos"),
-    "polled": ("PROFIBUS", "profibus-dp", "Modbus RTU", "dynamixel", "Feetech", "WorldFIP"),
+    "polled": ("PROFIBUS", "profibus-dp", "Modbus RTU", "dynamixel", "Feetech", "WorldFIP", "Mesa Ethernet"),
     "sercos2": ("SERCOS II", "sercos 2", "Sercos I", "SERCOS I and II"),
 }
 

@@ -476,8 +476,8 @@ def test_others_are_skipped_on_request_alone(busplan: Busplan, folder: Path) -> 
         "p/other.toml: skipped, claims no schema_version",
         "p/clean.toml: ok",
         (
-            "p/clean.toml: rests on an instant host, no busy retries, PHYs of 14 ticks, a chain of cables, "
-            "no slower execution, no other traffic"
+            "p/clean.toml: rests on an instant host, cycles without jitter, no busy retries, PHYs of 14 ticks, "
+            "a chain of cables, no slower execution, no other traffic"
         ),
         "checked 1 profile: 0 errors, 0 warnings; skipped 1 file without a schema_version",
     ]

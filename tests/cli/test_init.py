@@ -178,15 +178,27 @@ def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> 
 def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
     # What is no number is asked for again.
     code, said = answered(
-        tmp_path, b"myrinet\n", b"FireWire\n", b"many\n", b"0\n", b"5\n", b"\n", b"12\n", arguments=("--axes", "10")
+        tmp_path,
+        b"myrinet\n",
+        b"FireWire\n",
+        b"many\n",
+        b"0\n",
+        b"5\n",
+        b"\n",
+        b"12\n",
+        b"stock\n",
+        arguments=("--axes", "10"),
     )
     assert code == 0
     assert said.index("myrinet: no kind of bus") < said.index("Nodes, the host")
     assert said.count("Nodes, the host not counted [4]") == 3
     assert "must be 1 or more" in said
     assert "Axes of all nodes" not in said
+    assert "real-time: PREEMPT_RT with a stock driver" in said
+    assert "Host: real-time, low-latency, stock, none [none]:" in said
     data = tomllib.loads((tmp_path / "asked.toml").read_text(encoding="utf-8"))
     assert (data["bus"]["nodes"], data["node"]["axes"], data["payload"]["read_bytes_per_axis"]) == (5, 2, 12)
+    assert (data["bus"]["sync_jitter_us"], data["bus"]["sync_jitter_cycles"]) == (235_000, 900_000)
 
 
 def test_ctrl_c_at_a_question_is_an_interrupt_and_an_input_that_ends_is_no_answer(tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     assert answer["used"].startswith("270 us of the 2000 that the bus may use, 13 %")
     assert answer["free"] == "1730 us, +/- 6"
     assert answer["room for"] == "11 more nodes: 13 nodes, 52 axes in all"
-    assert answer["rests on"].startswith("an instant host, no busy retries")
+    assert answer["rests on"].startswith("an instant host, cycles without jitter")
     # These lines are the answer in the document, too.
     assert answer == {one["label"]: one["text"] for one in verdicts(run, "paper-4ms")[0]["lines"]}
     assert "(4)" not in done.stdout

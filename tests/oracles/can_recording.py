@@ -307,7 +307,9 @@ class _Host:
         elif stream in self.feedback:
             self.missing[cycle] -= 1
             if not self.missing[cycle] and not bus.get("pipeline_cycles", 0):
-                yield from self.commands(frame.us + self.random.uniform(0.5, 1) * bus.get("host_us", 0.0), cycle)
+                adapter_us = bus.get("host_read_us", 0.0) + bus.get("host_write_us", 0.0)
+                host_us = self.random.uniform(0.5, 1) * bus.get("host_us", 0.0)
+                yield from self.commands(frame.us + host_us + adapter_us, cycle)
 
     def commands(self, us: float, cycle: int) -> Iterator[Queued]:
         """The commands of a cycle."""
@@ -378,6 +380,8 @@ def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
             if stream in periods_us:
                 found[f"{stream} sooner"] = max(found[f"{stream} sooner"], _sooner_us(frames, periods_us[stream]))
             elif stream != "SYNC":
+                of_syncs_us = [frame.us - syncs[number] for frame in frames if (number := frame.queued.number) in syncs]
+                found[f"{stream} response"] = max(found[f"{stream} response"], *of_syncs_us, 0.0)
                 # What the last SYNC asked for may come when the log has ended.
                 due = sorted(number for number in syncs if (number - first.number) % every == 0)[:-1]
                 found["PDOs missing"] += len(set(due) - numbers)

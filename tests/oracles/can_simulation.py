@@ -84,6 +84,7 @@ def simulate(
     errors_us: Sequence[int] = (),
     error_us: int = 0,
     orders: Mapping[Hashable, Random | None] = _BY_PRIORITY,
+    adapter_us: Sequence[Sequence[tuple[int, int]]] = (),
 ) -> Run:
     """Run as many cycles as there are host times.
 
@@ -105,9 +106,12 @@ def simulate(
         Instants of errors, ascending, and how long each holds the bus. Those without a frame on the bus do nothing.
     orders
         Senders whose queue is not by priority: None where it is first in, first out, else what draws any of it.
+    adapter_us
+        From the end of a feedback frame to the host's program, and from there to the queued command, of each node,
+        cycle by cycle; without it no time.
     """
     bus = _Bus(sync, nodes, messages, period_us, host_us, sync_late_us or (0,) * len(host_us))
-    bus.orders = orders
+    bus.orders, bus.adapter_us = orders, adapter_us or ([(0, 0)] * len(nodes),) * len(host_us)
     bus.run(late_us, errors_us, error_us)
     return Run(
         tuple(bus.ends),
@@ -141,6 +145,9 @@ class _Bus:
         self.responses: list[list[int]] = [[] for _ in messages]
         self.missing = [sum(len(node.feedback) for node in nodes if node.is_due(cycle)) for cycle in range(cycles)]
         """Feedback frames that have not arrived, of each cycle."""
+        self.adapter_us: Sequence[Sequence[tuple[int, int]]] = ()
+        self.known_us = [0] * cycles
+        """When the host's program has all feedback that has arrived, of each cycle."""
         self.unsent = [[len(node.command) for node in nodes] for _ in range(cycles)]
         """Command frames that have not arrived, of each cycle and node."""
         self.queue: list[tuple[int, int, int, tuple[int, ...]]] = []
@@ -227,16 +234,18 @@ class _Bus:
             for frame in node.feedback:
                 self.put(ready_us, frame, FEEDBACK, cycle, number)
 
-    def feedback_arrived(self, now_us: int, cycle: int, _number: int) -> None:
-        """Behind the last feedback the host begins to compute."""
+    def feedback_arrived(self, now_us: int, cycle: int, number: int) -> None:
+        """When its program has the last feedback the host begins to compute."""
         self.missing[cycle] -= 1
+        self.known_us[cycle] = max(self.known_us[cycle], now_us + self.adapter_us[cycle][number][0])
         if self.missing[cycle]:
             return
-        ready_us = now_us + self.host_us[cycle]
-        self.commands[cycle] = ready_us - cycle * self.period_us
-        for number, node in enumerate(self.nodes):
+        ready_us = self.known_us[cycle] + self.host_us[cycle]
+        for place, node in enumerate(self.nodes):
+            queued_us = ready_us + self.adapter_us[cycle][place][1]
             for frame in node.command if node.is_due(cycle) else ():
-                self.put(ready_us, frame, COMMAND, cycle, number)
+                self.commands[cycle] = max(self.commands[cycle], queued_us - cycle * self.period_us)
+                self.put(queued_us, frame, COMMAND, cycle, place)
 
     def command_arrived(self, now_us: int, cycle: int, number: int) -> None:
         """Behind its last frame the node executes its command."""

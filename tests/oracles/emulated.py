@@ -28,6 +28,7 @@ TRUTHS: Final = (
     (r"(.+): jitter of the arrival", ("{} jitter",)),
     (r"(.+): sooner than its period", ("{} sooner",)),
     (r"(.+): data", ("{} data",)),
+    (r"(.+): response", ("{} response",)),
     (r"cycles without SYNC", ("SYNC missing",)),
     (r"PDOs (missing|twice)", ("PDOs {}",)),
     (r"error frames", ("error frames",)),

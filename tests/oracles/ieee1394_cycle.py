@@ -76,7 +76,8 @@ def exact_required_us(profile: busplan.Profile, model: str, nodes: int, *, extra
     if bus["cycle_master"]:
         start_us = reset_us + arbitration_us + way_us + Fraction(160) / base + Fraction(bus["isochronous_us"])
         total += _number_of_starts(total, start_us) * start_us
-    return Fraction(total)
+    # A cycle start before the late host sends delays nothing.
+    return Fraction(total + Fraction(bus["sync_jitter_us"]))
 
 
 def _filled(size: int) -> int:

@@ -96,7 +96,9 @@ def of_capture(machine: ethercat.Machine, cycles: int, *, seed: int) -> tuple[li
         if is_data and not packet.returned and cycle not in first:
             first[cycle] = number
             found["latest start"].append(Event(number, late_us[cycle]))
-    seen = sorted(first)
+    # Of a cycle that the capture has in part nobody knows more.
+    sent = Counter(packet.trip.cycle for packet in packets if not packet.returned and not packet.trip.is_poll)
+    seen = sorted(cycle for cycle in first if sent[cycle] == len(machine.frames(cycle)))
     for before, after in pairwise(seen):
         due = sum(bool(machine.frames(cycle)) for cycle in range(before + 1, after))
         if due:

@@ -89,11 +89,10 @@ def servos_us(
     reads: int,
     is_sync: bool,
     turn_us: float,
-    adapter_us: float,
 ) -> float:
     """A cycle of serial servos: all are read, then all are written."""
     wire, bit_us = Wire(10), Fraction(1000) / Fraction(rate)
-    turn, adapter = Fraction(turn_us) / bit_us, Fraction(adapter_us) / bit_us
+    turn = Fraction(turn_us) / bit_us
     status = b"E" if kind is FEETECH else b"\x55E"
 
     def frame(instruction: bytes, parameters: bytes) -> bytes:
@@ -104,7 +103,6 @@ def servos_us(
         for answer in answers:
             wire.wait(turn)
             wire.send(answer)
-        wire.wait(adapter if answers else 0)
 
     for part in range(reads):
         size = read // reads + (part < read % reads)

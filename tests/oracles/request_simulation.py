@@ -1,7 +1,8 @@
 """An event simulation of a CAN bus whose nodes answer requests, as an oracle: it imports nothing of busplan.
 
 The host hands a request to its controller after some time of its own: each behind the answer before (`polled`), or one
-behind the other without waiting (burst). A node queues its answer some time behind the end of its request. Whenever the
+behind the other without waiting (burst). The host's adapter takes a while from the program to the controller, and from
+the end of an answer to the program. A node queues its answer some time behind the end of its request. Whenever the
 bus is free the queued frame with the smallest identifier goes, and nothing interrupts it. Other messages are queued
 when the caller says. Times are whole numbers of any unit.
 """
@@ -34,6 +35,8 @@ class Sent(NamedTuple):
     queued_us: int
     start_us: int
     end_us: int
+    known_us: int
+    """When the host's program has an answer; of others as it ended."""
 
 
 def simulate(
@@ -44,6 +47,7 @@ def simulate(
     host_us: Sequence[Sequence[int]],
     polled: bool,
     late_us: int = 0,
+    adapter_us: Sequence[Sequence[tuple[int, int]]] = (),
 ) -> list[Sent]:
     """Run a cycle from each of some instants on.
 
@@ -61,8 +65,11 @@ def simulate(
         Whether each request waits for the answer before.
     late_us
         A frame that is queued so long behind the start of another still takes part in its arbitration.
+    adapter_us
+        From the program to the controller, and from an answer's end to the program, of each request, by cycle; without
+        it no time.
     """
-    bus = _Bus(motors, host_us, polled=polled)
+    bus = _Bus(motors, host_us, adapter_us or [[(0, 0)] * len(motors)] * len(starts_us), polled=polled)
     for place, (frame, queued_us) in enumerate(messages):
         for instance, when_us in enumerate(queued_us):
             bus.put(when_us, [frame], "message", place, instance)
@@ -70,15 +77,22 @@ def simulate(
         when_us = start_us
         for number in range(1 if polled else len(motors)):
             when_us += host_us[cycle][number]
-            bus.put(when_us, motors[number].request, "request", number, cycle)
+            bus.put(when_us + bus.adapter_us[cycle][number][0], motors[number].request, "request", number, cycle)
     return bus.run(late_us)
 
 
 class _Bus:
     """A bus while it runs."""
 
-    def __init__(self, motors: Sequence[Motor], host_us: Sequence[Sequence[int]], *, polled: bool) -> None:
-        self.motors, self.host_us, self.polled = motors, host_us, polled
+    def __init__(
+        self,
+        motors: Sequence[Motor],
+        host_us: Sequence[Sequence[int]],
+        adapter_us: Sequence[Sequence[tuple[int, int]]],
+        *,
+        polled: bool,
+    ) -> None:
+        self.motors, self.host_us, self.adapter_us, self.polled = motors, host_us, adapter_us, polled
         self.running = count()
         self.coming: list[tuple[int, int, Frame, str, int, int]] = []
         self.left: dict[tuple[str, int, int], int] = {}
@@ -101,11 +115,12 @@ class _Bus:
                 when_us, run, (identifier, us), sort, number, cycle = heappop(self.coming)
                 heappush(pending, (identifier, run, us, when_us, sort, number, cycle))
             _, _, us, when_us, sort, number, cycle = heappop(pending)
-            sent.append(Sent(sort, number, cycle, when_us, now_us, now_us + us))
-            now_us += us
+            start_us, now_us = now_us, now_us + us
+            known_us = now_us + (self.adapter_us[cycle][number][1] if sort == "answer" else 0)
+            sent.append(Sent(sort, number, cycle, when_us, start_us, now_us, known_us))
             self.left[sort, number, cycle] -= 1
             if not self.left[sort, number, cycle]:
-                self.arrived(now_us, sort, number, cycle)
+                self.arrived(known_us, sort, number, cycle)
         return sent
 
     def arrived(self, now_us: int, sort: str, number: int, cycle: int) -> None:
@@ -113,5 +128,5 @@ class _Bus:
         if sort == "request":
             self.put(now_us + self.motors[number].exec_us[cycle], self.motors[number].answer, "answer", number, cycle)
         elif sort == "answer" and self.polled and number + 1 < len(self.motors):
-            when_us = now_us + self.host_us[cycle][number + 1]
+            when_us = now_us + self.host_us[cycle][number + 1] + self.adapter_us[cycle][number + 1][0]
             self.put(when_us, self.motors[number + 1].request, "request", number + 1, cycle)

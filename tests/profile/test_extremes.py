@@ -89,6 +89,11 @@ def test_more_tables_than_are_computed_are_refused_at_their_key(tmp_path: Path, 
     assert busplan.load_profile(path).name == data["name"]
 
 
+@pytest.mark.parametrize(("kind", "most"), [("can", 127), ("ieee1394", 62)])
+def test_there_are_no_more_groups_than_a_bus_has_nodes(kind: str, most: int) -> None:
+    assert profile_model(kind).model_json_schema()["properties"]["group"]["maxItems"] == most
+
+
 @pytest.mark.slow
 def test_what_takes_too_long_of_many_groups_is_refused_and_the_report_says_so(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"

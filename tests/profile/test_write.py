@@ -27,7 +27,7 @@ def test_a_written_profile_reads_to_the_same(tmp_path: Path) -> None:
             "ethercat": ("bus.process_data", "LRD-LWR"),
             "sercos3": ("bus.version", "V1.0"),
             "sercos2": ("bus.data_rate_mbit_s", 4),
-            "polled": ("bus.adapter_us", 500.0),
+            "polled": ("bus.adapter", "ftdi"),
         }[profile.bus.kind]
         changed = busplan.load_profile(profile, changes={nodes_key: 7, key: value, "cycle.period_us": 812.5})
         for one in (profile, changed):

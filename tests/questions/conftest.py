@@ -70,6 +70,7 @@ OF_STANDARD: dict[str, st.SearchStrategy[Any]] = {
     "cycle__schedule": st.sampled_from(["individual", "broadcast"]),
     "cycle__broadcast_request": st.sampled_from(["isochronous", "priority", "timed"]),
     "host__transaction_us": st.one_of(st.just(0.0), st.floats(0.0, 60.0)),
+    "bus__sync_jitter_us": st.one_of(st.just(0.0), st.floats(0.0, 300.0)),
     "node__read_response": st.sampled_from(["split", "concatenated"]),
     "node__write_response": st.sampled_from(["split", "unified"]),
     "node__response_us": st.floats(0.0, 1.63),
@@ -125,9 +126,10 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
     ways = {
         "profibus-dp": ["exchange"],
         "modbus-rtu": ["exchange", "single"],
-        "dynamixel-2": ["sync", "single"],
+        "dynamixel-2": ["sync", "fast-sync", "single"],
         "feetech": ["sync", "single"],
         "worldfip": ["single"],
+        "mesa-hm2-eth": ["single"],
     }
 
     def of_protocol(protocol: str) -> st.SearchStrategy[dict[str, Any]]:
@@ -141,8 +143,11 @@ def _polled_bus() -> st.SearchStrategy[dict[str, Any]]:
                 "requests": st.sampled_from(ways[protocol]),
                 "reads": st.integers(1, 3),
                 "writes": st.integers(1, 3),
-                "adapter_us": st.one_of(st.just(0.0), st.floats(0.0, 2000.0)),
+                "adapter": st.sampled_from(
+                    ["none", "ftdi-low-latency", "ftdi", {"timer_us": 500.0, "packet_bytes": 8}]
+                ),
                 "host_us": st.floats(0.0, 200.0),
+                "master_jitter_us": st.one_of(st.just(0.0), st.floats(0.0, 300.0)),
                 "global_control": st.just(is_profibus),
                 "retries": st.integers(0, 2),
                 "timeout_us": st.floats(0.0, 3000.0),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from busplan.buses.cycle import BusCycle
 from busplan.buses.emulation import Emulator
 from busplan.buses.figure import BusFigures
+from busplan.buses.hosts import Host, hosts
 from busplan.buses.limits import (
     ANY_PERIOD,
     IDLE,
@@ -117,6 +118,18 @@ class Bus(ABC):
     def key_of(self, role: KeyRole) -> str:
         """Dotted key with a role; empty where the kind has none."""
         return next((name for name, key in self.keys.items() if key.role == role), "")
+
+    def hosts(self, variant: str = "") -> dict[str, Host]:
+        """Hosts that a new profile may have, by name: those of which its keys can say all that is known."""
+        timed = {name: host for name, host in hosts().items() if self.kind in host.own_us}
+        has_jitter = self.key_of("wake-up") and variant not in self.starter.without_wake_up
+        return timed or {name: host for name, host in hosts().items() if host.jitter_us and has_jitter}
+
+    def new_section(self, host: str | None = None, variant: str = "") -> str:
+        """Section [bus] of a new profile, without its nodes, with the lines of a host, by default the kind's usual."""
+        name = host or self.starter.host
+        keys = {"own": self.key_of("host"), "jitter": self.key_of("wake-up")}
+        return self.starter.section(hosts()[name].lines(self.kind, **keys) if name else (), variant)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """Settings of the bus that a plan may change; asked again after each change of the network."""

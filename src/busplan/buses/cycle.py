@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeAlias
 from busplan.buses.figure import REQUIRED, Figure, OwnFigures, term_name
 from busplan.buses.network import Group, Network, Rate
 from busplan.elementwise import Number, is_off, total
+from busplan.sections.base import beside
 
 Rounds: TypeAlias = Literal["all", "first", "but first"]
 ALL: Final[Rounds] = "all"
@@ -119,10 +120,10 @@ class Doubt(NamedTuple):
 
 
 class RestsOn(NamedTuple):
-    """An assumption of a verdict about something that the profile does not give."""
+    """An assumption of a verdict about something that the profile does not give, or gives as measured."""
 
     key: str
-    """Dotted key that would give it; empty where no key does."""
+    """Dotted key that would give it, or gives it; empty where no key does."""
     words: str
     """The assumption in a few words."""
 
@@ -256,7 +257,7 @@ class BusCycle(ABC):
 
     def taking_us(self, group: Group) -> float:
         """Time from a command's arrival at a node to its effect: the slowest execution of a write [us]."""
-        return group.write_execution_us + group.worst_extra_us
+        return float(group.slowest_us("write"))
 
     def sampled_us(self) -> float:
         """Time from the start of a cycle at which nodes sample the feedback that it carries, in plain numbers [us]."""
@@ -275,6 +276,10 @@ class BusCycle(ABC):
         """
         return 1 if at_sync else 0
 
+    def host_lag_us(self) -> float:
+        """Time of the host's adapter in a loop on the host that is in no cycle, in plain numbers [us]."""
+        return 0.0
+
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubts of inputs that are not known exactly; different inputs are independent."""
         return ()
@@ -285,13 +290,23 @@ class BusCycle(ABC):
         return True
 
     def rests_on(self) -> tuple[RestsOn, ...]:
-        """Assumptions about keys that the profile does not give, the most important first."""
-        return tuple(
-            RestsOn(key, premise.words)
-            for premise in (*self.premises, *SHARED_PREMISES)
-            if premise.applies(self)
-            for key in self._not_given(premise.key)
+        """A measured wake-up, and assumptions about keys that the profile does not give, the most important first."""
+        return (
+            *self._measured_wake_up(),
+            *(
+                RestsOn(key, premise.words)
+                for premise in (*self.premises, *SHARED_PREMISES)
+                if premise.applies(self)
+                for key in self._not_given(premise.key)
+            ),
         )
+
+    def _measured_wake_up(self) -> Iterator[RestsOn]:
+        key, bus = self.network.bus.key_of("wake-up"), self.network.profile.bus
+        name = key.removeprefix("bus.")
+        cycles = getattr(bus, beside(name, "cycles")) if key else None
+        if cycles is not None and getattr(bus, name):
+            yield RestsOn(beside(key, "cycles"), f"a wake-up measured, worst of {int(cycles):,} cycles")
 
     def _not_given(self, key: str) -> Iterator[str]:
         """Dotted keys behind a key of the table that the profile does not give, for each group; 0 counts as given."""

@@ -256,6 +256,14 @@ SAFE_REQUIRED: Final = Figure(
     "slice needed to show that it fits",
     better="less",
 )
+LEAST_REQUIRED: Final = Figure(
+    "least_required_us",
+    "T_least",
+    _CERTAINTY,
+    "time that the whole cycle needs at least, without what is only possible; a period shorter than this does not fit",
+    "required time, at least",
+    better="less",
+)
 SAFE_NODES: Final = Figure(
     "safe_nodes",
     "N_safe",
@@ -296,7 +304,7 @@ NOT_SHOWN: Final = Figure(
     sort="words",
 )
 CERTAINTY: Final = (
-    *(BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_NODES, SAFE_AXES),
+    *(BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, LEAST_REQUIRED, SAFE_NODES, SAFE_AXES),
     *(SAFE_LIMITED_BY, SAFE_MIN_PERIOD, NOT_SHOWN, VERDICT),
 )
 """Figures of the timing model that decides; no other model has them."""

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, unique
 from functools import reduce
@@ -12,8 +12,9 @@ from typing import Final, Literal, NamedTuple
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleProblem, RuleSubject
-from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, is_over, larger, next_entry, smaller, total
 from busplan.english import told_apart
+from busplan.sections.base import TRANSACTION_KINDS, beside
 from busplan.sourced import Grade
 
 Value = int | float | str
@@ -40,11 +41,11 @@ class Safety(NamedTuple):
     """Values of keys after a bus reset, until somebody sets them again."""
 
 
-KeyRole = Literal["cable", "clock", "host", "pipeline"]
+KeyRole = Literal["cable", "clock", "host", "pipeline", "wake-up"]
 """Part of a machine that a key of any kind stands for.
 
-It is the length of a cable [m], a common clock of the nodes, the host's own time in the cycle, or the whole periods
-that the host adds to a loop.
+It is the length of a cable [m], a common clock of the nodes, the host's own time from what it receives to what it
+sends, the whole periods that the host adds to a loop, or the latest start of a cycle by the host.
 """
 
 
@@ -267,6 +268,42 @@ class NothingUnknown(Limit):
         return self.value(network)
 
 
+class WakeUp(NothingUnknown):
+    """The latest wake-up of measured cycles is no bound: the next cycle may be later.
+
+    Of exchangeable cycles each is as likely the latest. So the next n cycles hold on average n / (n + 1), about one,
+    that is later than the worst of n measured ones. Who accepts one missed cycle in as many accepts that; what happens
+    in more cycles than were measured, no recording shows.
+    """
+
+    key = "wake_up"
+    label = "the host's wake-up"
+    way_out = "limits.missed_cycles = 1 accepts one later cycle in as many"
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+        """Key of the latest start of a cycle by the host."""
+
+    def _measured(self, network: Network) -> tuple[Number, Number | None]:
+        """The latest start [us], and the number of cycles of which it is the worst; None where it is a bound."""
+        bus = network.profile.bus
+        name = self.place.removeprefix("bus.")
+        return getattr(bus, name), getattr(bus, beside(name, "cycles"))
+
+    def value(self, network: Network) -> Number:
+        """Whether a measured worst stands for a bound, and nobody accepts a later cycle, 1 or 0."""
+        latest_us, cycles = self._measured(network)
+        if cycles is None:
+            return 0
+        is_accepted = choose(network.profile.limits.missed_cycles >= 1, 1, 0)
+        return choose(latest_us > 0, 1 - is_accepted, 0)
+
+    def words(self, network: Network) -> str:
+        """The latest start, and the number of the measured cycles."""
+        latest_us, cycles = self._measured(network)
+        return f"{self.place} = {latest_us:g} is the worst of {int(cycles or 0):,} measured cycles, no bound"
+
+
 class ShareOfPeriod(Limit):
     """A time that must be over within a share of the period; it must not depend on the period [us]."""
 
@@ -291,10 +328,8 @@ class Starter(NamedTuple):
 
     bus: str
     """Section [bus] in TOML, without its nodes and its host."""
-    hosts: Mapping[str, str] = {}
-    """Hosts to choose from, each with its lines of [bus]; none where the host plays no part."""
     host: str = ""
-    """Host of a new profile, unless another is asked for."""
+    """Host of a new profile, unless another is asked for; empty where the profile says nothing of its host."""
     period: str = "1ms"
     """Communication period, unless another is asked for."""
     slice_ratio: str = "1            # the whole period is for communication"
@@ -305,33 +340,45 @@ class Starter(NamedTuple):
     """Commented lines of a node, for keys that have no right default."""
     variants: Mapping[str, str] = {}
     """Other buses of the kind by name: further lines of [bus], as of "can-fd", or a whole section, "profibus"."""
+    without_wake_up: tuple[str, ...] = ()
+    """Variants that have no key of the host's wake-up."""
+    servos: Mapping[str, Mapping[str, tuple[int, str]]] = {}
+    """Variants whose nodes are servos of one axis: their data by direction [bytes], each with its meaning."""
     rate: str = ""
     """Key of [bus] with a bit rate that a user is asked for; empty where there is only one."""
     base: str = "time of a node's work in each cycle"
     """Meaning of execution.base_us."""
+    bases_us: Mapping[str, int] = {}
+    """Value of execution.base_us in variants whose nodes are known to take longer than others [us]."""
     table: str = ""
     """Keys of a published execution time, in place of a guess."""
+    tables: Mapping[str, str] = {}
+    """The same by variant, where one has its own."""
     more: str = ""
     """Commented lines at the end of the profile."""
 
-    @property
-    def execution(self) -> str:
-        """Keys of a node's execution time, which is assumed."""
+    def execution(self, variant: str = "") -> str:
+        """Keys of a node's execution time, which is assumed unless the kind, or the variant, has a better one."""
         return (
-            self.table
+            self.tables.get(variant)
+            or self.table
             or f"""\
 kind = "linear"
 grade = "assumed"          # between 0 and twice its value
-base_us = 20               # assumed: {self.base}
+base_us = {self.bases_us.get(variant, 20)}               # assumed: {self.base}
 per_byte_us = 0.1          # assumed: time per byte
 """
         )
 
-    def section(self, host: str | None = None, variant: str = "") -> str:
-        """Section [bus] with the lines of a host, by default `host`, and those of a variant, or the variant's own."""
+    def section(self, host: Iterable[str], variant: str) -> str:
+        """Section [bus] with lines on the host and those of a variant, or the variant's own section."""
         more = self.variants.get(variant, "")
         bus, more = (more, "") if more.startswith("[bus]") else (self.bus, more)
-        return "\n".join(filter(None, (bus, self.hosts.get(host or self.host), more)))
+        given = tuple(host)
+        # A commented key is a proposal.
+        proposed = tuple(f"# {line.partition('=')[0]}=" for line in given)
+        kept = (line for line in bus.splitlines() if not line.startswith(proposed))
+        return "\n".join(filter(None, (*kept, *given, more)))
 
 
 @unique
@@ -524,7 +571,7 @@ def busy_words(group: Group, network: Network) -> str:
 
 def _busy_us(group: Group) -> Number:
     """Execution time of a node in a cycle: a read and a write, the slowest of each [us]."""
-    return group.read_execution_us + group.write_execution_us + 2 * group.worst_extra_us
+    return total(map(group.slowest_us, TRANSACTION_KINDS))
 
 
 def _busy_doubt_us(group: Group) -> Number:

@@ -5,7 +5,8 @@ from functools import reduce
 from math import lcm
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from busplan.elementwise import Number, is_everywhere, larger, total
+from busplan.elementwise import Number, choose, is_everywhere, larger, total
+from busplan.sections.base import TransactionKind
 from busplan.sections.machine import ProfileGroup
 
 if TYPE_CHECKING:
@@ -66,6 +67,30 @@ class Group(NamedTuple):
     """Standard uncertainty of the execution time of a read [us]."""
     write_uncertainty_us: Number = 0.0
     """Standard uncertainty of the execution time of a write [us]."""
+
+    def bytes_of(self, kind: TransactionKind) -> Number:
+        """Payload of a transaction with each node [bytes]."""
+        return self.read_bytes if kind == "read" else self.write_bytes
+
+    def nodes_with(self, kind: TransactionKind) -> Number:
+        """Nodes that have data in a direction: all or, where it has 0 bytes, none [1]."""
+        return self.if_any(kind, self.nodes)
+
+    def has(self, kind: TransactionKind) -> bool:
+        """Whether there are data in a direction; in an array, at any point."""
+        return not is_everywhere(self.bytes_of(kind) <= 0)
+
+    def if_any(self, kind: TransactionKind, number: Number) -> Number:
+        """A number of a direction with data; 0 where there are none."""
+        if not self.has(kind):
+            return 0
+        has_data: Number = self.bytes_of(kind) > 0
+        return number if is_everywhere(has_data) else choose(has_data, number, 0)
+
+    def slowest_us(self, kind: TransactionKind) -> Number:
+        """Execution time of the slowest read or write; 0 where there is none [us]."""
+        us = self.read_execution_us if kind == "read" else self.write_execution_us
+        return self.if_any(kind, us + self.worst_extra_us)
 
     @property
     def node(self) -> Any:

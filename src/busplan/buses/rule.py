@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 from busplan.english import told_apart
+from busplan.sections.base import beside
 from busplan.sourced import Sourced, read_toml
 
 if TYPE_CHECKING:
@@ -272,6 +273,22 @@ class Recorded(NamedTuple):
         if not synthetic:
             return self
         return self._replace(edits={}, shows_nothing=(f"{synthetic}; no machine was recorded", *self.shows_nothing))
+
+
+def latest_start(key: str, us: float, *, events: int, share: float) -> dict[str, object]:
+    """New value of the latest start of a cycle, and the number of cycles of which it is the worst.
+
+    A quantile below 1 is as rare as the worst of 1 / (1 - share) cycles.
+
+    Examples
+    --------
+    >>> latest_start("bus.sync_jitter_us", 20.0, events=9000, share=1.0)
+    {'bus.sync_jitter_us': 20.0, 'bus.sync_jitter_cycles': 9000}
+    >>> latest_start("bus.sync_jitter_us", 12.5, events=9000, share=0.999)["bus.sync_jitter_cycles"]
+    1000
+    """
+    cycles = events if share == 1 else min(events, round(1 / (1 - share)))
+    return {key: us, beside(key, "cycles"): cycles}
 
 
 def day_of(time_ns: int) -> str:

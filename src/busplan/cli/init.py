@@ -3,12 +3,15 @@
 import re
 import shlex
 import sys
+from collections.abc import Mapping
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
+from busplan.buses.hosts import hosts
 from busplan.cli.command import command
 from busplan.cli.options import complete_kind, complete_profile, time_us
 from busplan.cli.output import message_width, say
@@ -25,6 +28,7 @@ _NODES = 4
 _AXES_PER_NODE = 4
 _BIT_RATE = 1000
 _BYTES_PER_AXIS = 8
+_NO_HOST = "none"
 _GROUP: Final = re.compile(
     r"(?P<name>[\w-]{1,40}):(?P<nodes>\d{1,7})x(?P<axes>\d{1,7})(:(?P<read>\d{1,7})/(?P<write>\d{1,7}))?", re.ASCII
 )
@@ -47,10 +51,16 @@ def init_command(
         ),
     ] = None,
     nodes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]")
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4, or as --axes needs]"
+        ),
     ] = None,
     axes: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node]")
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node, 1 for each servo]"
+        ),
     ] = None,
     group: Annotated[
         list[str] | None,
@@ -75,8 +85,9 @@ def init_command(
         str | None,
         typer.Option(
             metavar="HOST",
-            help="Host of an EtherCAT bus, which sets the assumed time of the master: hardware, tuned, real-time "
-            "or stock. Only for EtherCAT.  [default: tuned]",
+            help="Host, with the assumed times of its own and of its latest wake-up, as others measured them: "
+            f"{', '.join(f'{name} ({host.meaning})' for name, host in hosts().items())}. Not every bus knows each."
+            "  [default: tuned on EtherCAT, else not said]",
         ),
     ] = None,
     bit_rate: Annotated[
@@ -125,7 +136,7 @@ def init_command(
 
     if source is None:
         kind, variant = values.kind()
-        machine = _machine(kind, values)._replace(variant=variant)
+        machine = _machine(kind, variant, values)
         text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
     else:
         if values.given:
@@ -229,7 +240,7 @@ class _Values:
         return period_us
 
 
-def _machine(kind: str, values: _Values) -> "Machine":
+def _machine(kind: str, variant: str, values: _Values) -> "Machine":
     """The machine of the options; values that they leave open are asked for, or defaults."""
     from busplan.profile.starter import Machine, shared_out
 
@@ -237,26 +248,48 @@ def _machine(kind: str, values: _Values) -> "Machine":
     if groups and values.given.keys() & {"--nodes", "--axes"}:
         raise BusplanError("--group: cannot be used with --nodes or --axes: each group says its own")
     if not groups:
-        nodes = values.number("--nodes", "Nodes, the host not counted", _NODES)
-        axes = values.number("--axes", "Axes of all nodes", _AXES_PER_NODE * nodes)
+        per_node = 1 if variant in starter.servos else _AXES_PER_NODE
+        usual = ceil(values.given["--axes"] / per_node) if "--axes" in values.given else _NODES
+        nodes = values.number("--nodes", "Nodes, the host not counted", usual)
+        axes = values.number("--axes", "Axes of all nodes", per_node * nodes)
         groups = shared_out(axes, nodes=nodes)
+    if variant in starter.servos and "--bytes-per-axis" not in values.given:
+        groups = tuple(_with_servo_data(group, starter.servos[variant]) for group in groups)
     period_us = values.period_us(starter.period)
     size = _BYTES_PER_AXIS
     if any(group.read_bytes is None for group in groups):
         size = values.number("--bytes-per-axis", "Bytes for each axis, in either direction", size)
     elif "--bytes-per-axis" in values.given:
         raise BusplanError("--bytes-per-axis: nothing takes it: each --group says the bytes of its nodes")
-    host = values.given.get("--host")
-    if starter.hosts:
-        if host is None and values.asks:
-            # The first line that the profile would have from each.
-            say(*(f"{name}: {' '.join(lines.partition(chr(10))[0].split())}" for name, lines in starter.hosts.items()))
-        host = values.value("--host", f"Host of the master: {', '.join(starter.hosts)}", starter.host)
-    if host is not None and host not in starter.hosts:
-        kinds = listed([name for name in kind_names() if kind_named(name).starter.hosts], "or")
-        known = f"there are {', '.join(starter.hosts)}"
-        raise BusplanError(f"--host {host}: {known if starter.hosts else f'only for --bus {kinds}, not for {kind}'}")
-    return Machine(groups, period_us, size, host, rate=_rate(kind, values))
+    host = _host(kind, variant, values)
+    return Machine(groups, period_us, size, host, variant, rate=_rate(kind, values))
+
+
+def _host(kind: str, variant: str, values: _Values) -> str | None:
+    """The host that is given or answered; None for the usual one, or for none where the kind has no usual one."""
+    known, usual, host = kind_named(kind).hosts(variant), kind_named(kind).starter.host, values.given.get("--host")
+    if known and host is None and (usual or values.asks):
+        if values.asks:
+            say(*(f"{name}: {host.meaning}" for name, host in known.items()))
+        names = ", ".join((*known, *([] if usual else [_NO_HOST])))
+        host = values.value("--host", f"Host: {names}", usual or _NO_HOST)
+    if host == _NO_HOST and not usual:
+        return None
+    if host is not None and host not in known:
+        kinds = listed([name for name in kind_names() if kind_named(name).hosts()], "or")
+        why = f"{kind} has {', '.join(known)}" if known else f"only for --bus {kinds}, not for {variant or kind}"
+        raise BusplanError(f"--host {host}: {why}")
+    return host
+
+
+def _with_servo_data(group: "NodeGroup", data: Mapping[str, tuple[int, str]]) -> "NodeGroup":
+    """The group with the usual data of its servos, where it does not say its own."""
+    if group.axes != 1 or group.read_bytes is not None:
+        return group
+    (read_bytes, read), (write_bytes, write) = data["read"], data["write"]
+    return group._replace(
+        read_bytes=read_bytes, write_bytes=write_bytes, data=(f"assumed: {read}", f"assumed: {write}")
+    )
 
 
 def _rate(kind: str, values: _Values) -> int | None:

@@ -238,8 +238,9 @@ def plan_problems(profile: Profile, recording: Recording) -> Iterator[tuple[Rule
 
 
 def _words(figure: RecordedFigure) -> str:
+    first = figure.first_words and f", {figure.first_words}"
     if figure.hidden or figure.planned is None or figure.recorded is None:
-        return f"{figure.quantity}: {figure.hidden}"
+        return f"{figure.quantity}: {figure.hidden}{first}"
     unit = {"1": "", "share": " %"}.get(figure.unit, f" {figure.unit}")
     factor = 100 if figure.unit == "share" else 1
     if figure.unit in ("1", "bytes"):
@@ -249,5 +250,4 @@ def _words(figure: RecordedFigure) -> str:
     doubt = "" if figure.uncertainty is None else f" +/- {factor * figure.uncertainty:.2g}"
     sense = "" if figure.sense == "equal" else f"{figure.sense} "
     note = f" ({figure.note})" if figure.note else ""
-    first = figure.first_words and f", {figure.first_words}"
     return f"{figure.quantity}: {recorded}{doubt}{unit} recorded, {sense}{allowed}{unit} planned{first}{note}"

@@ -1,27 +1,33 @@
 """The machine of a profile on another kind of bus, with the bus section of a new profile of that kind.
 
 The machine is what profiles of every kind have: nodes, axes, payloads, execution times, the period, the share of it for
-communication, the servo and the circle; also its cables, by whatever key. Keys of its own kind alone are left out, and
-those that only the new kind has are assumed.
+communication, the servo and the circle; also its cables and its host, by whatever key. Keys of its own kind alone are
+left out, and those that only the new kind has are assumed.
 """
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
-from typing import Any, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from pydantic import BaseModel
 
 from busplan.buses import kind_named
-from busplan.profile.document import TomlTable, profile_of
-from busplan.profile.kinds import dotted_keys, flat, models_of, named_tables
-from busplan.sections.base import TRANSACTION_KINDS
+from busplan.buses.bus import Bus
+from busplan.buses.limits import KeyRole
+from busplan.profile.document import TomlTable, comment_grade, profile_of
+from busplan.profile.kinds import dotted_keys, flat, holder, models_of, named_tables
+from busplan.sections.base import TRANSACTION_KINDS, beside
 from busplan.sections.profile import Profile
 
 _KIND, _NODES = "kind", "nodes"
 _SIZES = ("read_bytes", "write_bytes")
 _EVERY = "every"
 """Rate of a group, on kinds with several rates."""
+_OF_HOST: Final[tuple[KeyRole, ...]] = ("host", "wake-up", "pipeline")
+_BESIDE: Final = ("grade", "uncertainty_us", "cycles")
+_GRADES: Final = ("measured", "derived", "calibrated", "assumed")
+"""Grades that a key of a grade takes."""
 
 
 class AssumedKey(NamedTuple):
@@ -43,6 +49,8 @@ class Conversion(NamedTuple):
     """Keys of the new kind; empty on the profile's own."""
     left_out: tuple[str, ...]
     """Keys and sections of the profile that the kind does not have."""
+    of_host: Mapping[str, str] = {}
+    """Keys of the profile's host by their names on the kind."""
 
 
 def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
@@ -70,7 +78,7 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
     # The host keeps its share of the period, whatever the kind's default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
     bus = kind_named(kind)
-    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section(variant=variant))
+    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.new_section(variant=variant))
     cables_m = _cables_m(profile)
     if cables_m and cable_key:
         left_out = tuple(key for key in left_out if key not in cables_m)
@@ -82,12 +90,60 @@ def converted(profile: Profile, kind: str, *, variant: str = "") -> Conversion:
         if nodes and "execution" in nodes:
             # It was measured on the other bus.
             nodes["execution"]["grade"] = "assumed"
-    raised, empty = _with_payloads(machine)
+    values, of_host = _host(profile, bus, variant=variant)
+    for key, value in values.items():
+        table, last = holder(machine, key)
+        table[last] = value
+    carried = {*of_host.values(), *(key.rpartition(".")[0] for key in of_host.values())}
+    left_out = tuple(key for key in left_out if key not in carried)
+    # What a new profile assumes of its host gives way to the machine's own.
+    given_way = {key for role in _OF_HOST for key in _keys(bus, role).values() if bus.key_of(role) in values}
+    new["bus"] = {name: value for name, value in new["bus"].items() if f"bus.{name}" not in given_way}
+    empty = _without_couplers(machine)
     # A key that both have takes the value of the new bus.
     merged = {**machine, **{name: {**machine.get(name, {}), **table} for name, table in new.items()}}
     new_profile = profile_of(merged)
-    given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
-    return Conversion(new_profile, (*given, *_defaults(new_profile)), (*left_out, *empty))
+    given = [AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}"]
+    assumed = (*given, *(one for one in _defaults(new_profile) if one.key not in values))
+    return Conversion(new_profile, assumed, (*left_out, *empty), of_host)
+
+
+def _keys(bus: Bus, role: KeyRole) -> dict[str, str]:
+    """Dotted keys of a role: that of its value, under "", and those beside it that say how well it is known."""
+    key = bus.key_of(role)
+    section, _, name = key.partition(".")
+    keys = {"": key} if key else {}
+    for model in models_of(bus.profile_model().model_fields[section].annotation) if key else ():
+        for part in _BESIDE:
+            # In a section of the host alone they stand without the name of its time.
+            names = [one for one in (beside(name, part), part) if one in model.model_fields]
+            if names:
+                keys[part] = f"{section}.{names[0]}"
+    return keys
+
+
+def _host(profile: Profile, bus: Bus, *, variant: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """What the profile gives of its host, by the keys of another kind; and the names of these keys in the profile."""
+    own, said = kind_named(profile.bus.kind), dict(flat(profile.model_dump(exclude_unset=True)))
+    values: dict[str, Any] = {}
+    names: dict[str, str] = {}
+    for role in _OF_HOST[:1] if variant in bus.starter.without_wake_up else _OF_HOST:
+        of_own, of_kind = _keys(own, role), _keys(bus, role)
+        given = {part: said[key] for part, key in of_own.items() if part in of_kind and said.get(key) is not None}
+        if "" not in given or not _takes(bus, of_kind[""], given[""]):
+            continue
+        names |= {of_kind[part]: of_own[part] for part in given}
+        if "grade" in of_kind and (grade := comment_grade(profile, of_own[""])) in _GRADES:
+            given.setdefault("grade", grade)
+        values |= {of_kind[part]: value for part, value in given.items()}
+    return values, names
+
+
+def _takes(bus: Bus, key: str, value: Any) -> bool:
+    """Whether a kind has no larger least value of a key: the pipelines of some begin at one cycle."""
+    section, _, name = key.partition(".")
+    (model,) = models_of(bus.profile_model().model_fields[section].annotation)
+    return all(value >= getattr(bound, "ge", value) for bound in model.model_fields[name].metadata)
 
 
 def _with_rates(machine: TomlTable, profile: Profile, left_out: tuple[str, ...], *, kind: str) -> tuple[str, ...]:
@@ -110,22 +166,13 @@ def _say_payloads(machine: TomlTable, profile: Profile) -> None:
                 section[nodes.payload.key_of(kind)] = nodes.payload.bytes_of(kind, axes=1)
 
 
-def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
-    """Give nodes data in both directions.
-
-    Returns the keys set for that, and the groups left out because they have no data, as couplers.
-    """
+def _without_couplers(machine: TomlTable) -> tuple[str, ...]:
+    """Leave groups without data out, as couplers; returns their keys."""
     groups: Sequence[TomlTable] = machine.get("group", ())
     empty = [group["name"] for group in groups if not any(group.get(key, 1) for key in _SIZES)]
-    raised = []
-    for group in groups:
-        for key in _SIZES:
-            if group.get(key) == 0 and group["name"] not in empty:
-                group[key] = 1
-                raised.append(AssumedKey(f"group.{group['name']}.{key}", 1, "setting"))
     if empty and len(empty) < len(groups):
         machine["group"] = [group for group in groups if group["name"] not in empty]
-    return raised, [f"group.{name}" for name in empty]
+    return tuple(f"group.{name}" for name in empty)
 
 
 def _cables_m(profile: Profile) -> dict[str, float]:

@@ -173,7 +173,7 @@ def holder(
 
 _NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
 """Sections whose common keys no cycle depends on; a cycle may depend on keys that a kind of bus adds to them."""
-_OF_VERDICT: Final = ("limits.reserve",)
+_OF_VERDICT: Final = ("limits.reserve", "limits.missed_cycles")
 """Keys of these sections on which a verdict depends."""
 _OF_GROUP: Final = ("name", "execution.kind")
 """Keys of a group that determine how its other keys are read."""

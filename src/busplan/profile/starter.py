@@ -4,6 +4,7 @@ import re
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
+from busplan.buses.bus import Bus
 from busplan.buses.limits import Starter
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError, PlacedError
@@ -40,7 +41,8 @@ slice_ratio = {ratio}
 {parts}
 [limits]
 reserve = 0.15             # share of the slice that must stay free for the cycle to fit
-
+"""
+_MOTION: Final = """
 [servo]                    # take the values from the drives' commissioning, then grade them "measured"
 grade = "assumed"
 loop = "node"              # assumed: where the position loop is closed; "host" needs servo.update
@@ -58,7 +60,7 @@ feed_mm_per_min = 3000
 # How round must it be? Without a tolerance the circle is not judged. From the drawing or ISO 230-4, for example:
 # [tolerance]
 # circular_deviation_mm = 0.02
-{more}"""
+"""
 
 
 _COUNT: Final = "nodes = {nodes}                  # the host is not counted\n"
@@ -96,6 +98,8 @@ class NodeGroup(NamedTuple):
     """Payload that a node sends [bytes]; None for that of its axes."""
     write_bytes: int | None = None
     """Payload that a node receives [bytes]; None for that of its axes."""
+    data: tuple[str, str] = ("of a node", "of a node")
+    """What these payloads of a node with axes are."""
 
 
 class Machine(NamedTuple):
@@ -136,10 +140,12 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     """
     starter = kind_named(kind).starter
     first = machine.groups[0]
+    # Servos of a robot move along no circle of a machine tool.
+    motion = "" if machine.variant in starter.servos else _MOTION
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
-    text = _HEAD + _MACHINE.format(
+    text = (_HEAD + _MACHINE + motion + "{more}").format(
         name=value_text(name),
-        bus=_bus(starter, machine),
+        bus=_bus(kind_named(kind), machine),
         ratio=starter.slice_ratio,
         count="" if first.name else _COUNT.format(nodes=first.nodes),
         parts="\n".join(_part(group, machine=machine, starter=starter, file=file) for group in machine.groups),
@@ -150,12 +156,12 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     return _checked(text, name=name)
 
 
-def _bus(starter: Starter, machine: Machine) -> str:
+def _bus(bus: Bus, machine: Machine) -> str:
     """Section [bus]."""
-    section = starter.section(machine.host, machine.variant)
+    section, rate = bus.new_section(machine.host, machine.variant), bus.starter.rate
     if machine.rate is None:
         return section
-    return re.sub(rf"^{starter.rate} = .*$", f"{starter.rate} = {machine.rate}", section, flags=re.MULTILINE)
+    return re.sub(rf"^{rate} = .*$", f"{rate} = {machine.rate}", section, flags=re.MULTILINE)
 
 
 def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) -> str:
@@ -167,7 +173,7 @@ def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) ->
         axes=group.axes,
         payload=_payload(group, bytes_per_axis=machine.bytes_per_axis),
         measure=starter.measure.format(file=file, group=of_group),
-        execution=starter.execution,
+        execution=starter.execution(machine.variant),
         more=starter.node,
     )
 
@@ -175,10 +181,11 @@ def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) ->
 def _payload(group: NodeGroup, *, bytes_per_axis: int) -> str:
     if group.read_bytes is None and group.axes:
         return _PAYLOAD.format(bytes=bytes_per_axis)
-    sizes = (("read_bytes", group.read_bytes, "inputs"), ("write_bytes", group.write_bytes, "outputs"))
+    words = group.data if group.axes else ("as inputs", "as outputs")
+    sizes = (group.read_bytes, group.write_bytes)
     lines = (
-        (f"{key} = {bytes_per_axis if size is None else size}", "of a node" if group.axes else f"as {words}")
-        for key, size, words in sizes
+        (f"{key} = {bytes_per_axis if size is None else size}", word)
+        for key, size, word in zip(("read_bytes", "write_bytes"), sizes, words, strict=True)
     )
     return "".join(f"{line.ljust(_COMMENTS_AT)}# {comment}\n" for line, comment in lines)
 
@@ -187,7 +194,7 @@ def _checked(text: str, *, name: str) -> str:
     try:
         validate(decode(text.encode(), name=name))
     except PlacedError as refused:
-        problems = [problem for problem in refused.placed if problem.key.startswith("group.")]
+        problems = [problem for problem in refused.placed if "." in problem.key]
         if problems:
             raise BusplanError(*(problem.message for problem in problems)) from None
         raise _nameless(name) from None

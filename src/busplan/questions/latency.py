@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 from busplan.buses.figure import Figure
 from busplan.buses.network import Network
 from busplan.elementwise import Number, existing, within
+from busplan.english import listed
 from busplan.errors import BusplanError
 from busplan.forms import blocks
 from busplan.forms.numbers import known_text
@@ -217,14 +218,19 @@ def _blocks(answer: LatencyAnswer) -> Iterator[blocks.Block]:
     yield from _tables(answer)
     if loop and register.deadlines and loop[register.deadlines[0]] is not None:
         keys = (register.deadlines[0], *(key for key in _OF_LOOP if loop[key]))
-        parts = " and ".join(words for key, words in _OF_LOOP.items() if key in keys)
+        parts = [words for key, words in _OF_LOOP.items() if key in keys]
         effect = "SYNC that applies the command" if "sync_wait_us" in keys else "executed command"
-        whole = f"Loop: {{}} from SYNC to the {effect}{parts and f', of which {parts}'}."
+        of_which = f", of which {listed(parts, 'and')}" if parts else ""
+        whole = f"Loop: {{}} from SYNC to the {effect}{of_which}."
         yield blocks.sentence(whole, *(blocks.ShownValue(loop[key], key, "us", 0) for key in keys))
     yield from answer.notes
 
 
-_OF_LOOP: Final = {"pipeline_us": "{} are the host's cycles", "sync_wait_us": "{} the wait for that SYNC"}
+_OF_LOOP: Final = {
+    "adapter_us": "{} are the adapter's",
+    "pipeline_us": "{} are the host's cycles",
+    "sync_wait_us": "{} the wait for that SYNC",
+}
 """Parts of a loop that are no work, in words."""
 
 

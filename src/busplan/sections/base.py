@@ -19,8 +19,11 @@ MAX_GROUPS: Final = 500
 TimeUs = Annotated[float, Field(ge=0, le=MAX_TIME_US, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
 Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
-GROUPS: Final = Field(strict=False, max_length=MAX_GROUPS)
-"""An array of groups: strictness would refuse TOML's array for a tuple; the tables stay strict."""
+
+
+def groups_field(most: float = MAX_GROUPS) -> Any:
+    """An array of groups: strictness would refuse TOML's array for a tuple; the tables stay strict."""
+    return Field(strict=False, max_length=int(most))
 
 
 MISSING: Final = "Field required"
@@ -117,6 +120,17 @@ def value_at(section: Section, key: str) -> Any:
     for part in key.split("."):
         value = _by_name(value).get(part) if isinstance(value, tuple) else getattr(value, part, None)
     return value
+
+
+def beside(key: str, part: str) -> str:
+    """Dotted key beside another one: its grade, its uncertainty, or the cycles of which it is the worst.
+
+    Examples
+    --------
+    >>> beside("bus.master_jitter_us", "cycles"), beside("bus.host_us", "uncertainty_us")
+    ('bus.master_jitter_cycles', 'bus.host_uncertainty_us')
+    """
+    return f"{key.removesuffix('_us')}_{part}"
 
 
 _KEPT: Final = 8

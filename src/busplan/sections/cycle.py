@@ -205,23 +205,42 @@ class CycleSection(Section):
     )
 
 
-class PayloadSection(Section):
-    """Section [payload]: what is read from and written to each node in a cycle, fixed and for each of its axes."""
+_NO_DATA: Final = (
+    "makes 0 bytes, and so does what is read: nodes without data have no part in the cycle; give read_bytes, "
+    "write_bytes or both"
+)
 
-    read_bytes: Count | None = Field(
-        default=None, description="Payload of the read transaction, or its fixed part [bytes]", examples=[12]
+
+class PayloadSection(Section):
+    """Section [payload]: what is read from and written to each node in a cycle, fixed and for each of its axes.
+
+    In a direction of 0 bytes nothing is sent: no transaction, request, PDO or data.
+    """
+
+    read_bytes: Bytes | None = Field(
+        default=None,
+        description="Payload of the read transaction, or its fixed part; 0 where nodes are only written [bytes]",
+        examples=[12],
     )
-    write_bytes: Count | None = Field(
-        default=None, description="Payload of the write transaction, or its fixed part [bytes]", examples=[12]
+    write_bytes: Bytes | None = Field(
+        default=None,
+        description="Payload of the write transaction, or its fixed part; 0 where nodes are only read [bytes]",
+        examples=[12],
     )
-    read_bytes_per_axis: Count | None = Field(default=None, description="Read payload per axis [bytes]", examples=[8])
-    write_bytes_per_axis: Count | None = Field(default=None, description="Write payload per axis [bytes]", examples=[8])
+    read_bytes_per_axis: Bytes | None = Field(default=None, description="Read payload per axis [bytes]", examples=[8])
+    write_bytes_per_axis: Bytes | None = Field(default=None, description="Write payload per axis [bytes]", examples=[8])
+
+    may_be_empty: ClassVar[bool] = False
+    """Whether nodes may have no data in either direction."""
 
     def _problems(self) -> Iterator[Problem]:
         for kind in TRANSACTION_KINDS:
             if self._parts(kind) == (None, None):
                 why = f"missing key; expected {kind}_bytes, {kind}_bytes_per_axis or both"
                 yield Problem(why, key=f"{kind}_bytes", kind="missing-key")
+        given = [self._parts(kind) for kind in TRANSACTION_KINDS]
+        if not self.may_be_empty and (None, None) not in given and not any(map(any, given)):
+            yield Problem(_NO_DATA, key=self.key_of("write"), kind="inconsistent")
 
     def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
         return getattr(self, f"{kind}_bytes"), getattr(self, f"{kind}_bytes_per_axis")
@@ -269,14 +288,9 @@ class GroupSection(NodeSection, PayloadSection):
     nodes: Count = Field(description="Nodes of the group", examples=[2])
     axes: GroupAxes = Field(examples=[4])
 
-    may_be_empty: ClassVar[bool] = False
-    """Whether payloads of the group may have 0 bytes."""
-
     def _problems(self) -> Iterator[Problem]:
-        for kind in TRANSACTION_KINDS:
-            if not (self.may_be_empty or self.bytes_of(kind, axes=self.axes)):
-                why = f"makes a payload of 0 bytes: the group has no axes; give {kind}_bytes"
-                yield Problem(why, key=self.key_of(kind), kind="inconsistent")
+        if not (self.may_be_empty or any(self.bytes_of(kind, axes=self.axes) for kind in TRANSACTION_KINDS)):
+            yield Problem(_NO_DATA, key=self.key_of("write"), kind="inconsistent")
 
 
 SpareCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
@@ -306,6 +320,7 @@ class Limits(Section):
     missed_cycles: SpareCount = Field(
         default=0,
         description="Most cycles of a recording without a frame or SYNC, most PDOs missing or twice, and most error "
-        "frames",
+        "frames; from 1 on the plan, too, accepts one start of a cycle later than the worst of those measured, in as "
+        "many cycles",
         examples=[0],
     )

@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from busplan.english import has_controls
-from busplan.sections.base import GROUPS, MISSING, TRANSACTION_KINDS, Problem, Section, refused
+from busplan.sections.base import MISSING, TRANSACTION_KINDS, Problem, Section, groups_field, refused
 from busplan.sections.cycle import (
     BusSection,
     CycleSection,
@@ -72,7 +72,7 @@ class Profile(Section):
     cycle: CycleSection = Field(description="The communication cycle")
     payload: PayloadSection | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[GroupSection, ...], GROUPS] = Field(
+    group: Annotated[tuple[GroupSection, ...], groups_field()] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
     servo: ServoSection = Field(default_factory=ServoSection, description="Position loop and drive of both axes")
@@ -141,7 +141,7 @@ class Profile(Section):
                 continue
             right = f'measure it and add it to {nodes.node_key("execution")}, or use kind = "linear"'
             for key, size, sum_ in _payloads(nodes, place):
-                if not execution.covers(size):
+                if size and not execution.covers(size):
                     why = f"{sum_}is outside the execution table, {execution.range_bytes}: {right}"
                     yield Problem(why, key=key, kind="execution-unknown")
 

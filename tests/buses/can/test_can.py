@@ -52,6 +52,7 @@ def test_its_cycle_is_that_by_hand() -> None:
         "sync": 110,
         "wait": 96,
         "feedback": 3 * pdo_in,
+        "adapter": 0,
         "host": 0,
         "command": 3 * pdo_out,
         "blocking": 0,

@@ -163,6 +163,14 @@ def test_a_log_of_late_syncs_shows_the_key_that_plans_them(run: Run, tmp_path: P
     run("measured", "line.toml", log.name, "--apply", cwd=tmp_path)
     (written_us,) = re.findall(r"^sync_jitter_us = ([\d.]+)", (tmp_path / "line.toml").read_text(), re.MULTILINE)
     assert 15 < float(written_us) < 25
+    (cycles,) = re.findall(r"^sync_jitter_cycles = (\d+)", (tmp_path / "line.toml").read_text(), re.MULTILINE)
+    assert int(cycles) == len(re.findall(" 080#", log.read_text()))
+    # It is no bound: the recording keeps the plan, and no plan is shown to fit with it.
+    done = run("check", "line.toml", "--recording", log.name, cwd=tmp_path)
+    assert re.findall(r"BP\d+", done.stdout) == ["BP114"]
+    assert f"is the worst of {int(cycles):,} measured cycles, no bound" in done.stdout
+    with (tmp_path / "line.toml").open("a") as file:
+        file.write("[limits]\nmissed_cycles = 1\n")
     assert run("check", "line.toml", "--recording", log.name, cwd=tmp_path).returncode == 0
 
 

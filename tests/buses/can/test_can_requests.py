@@ -43,6 +43,8 @@ class Arm(NamedTuple):
     """Command and answer [bytes]."""
     exec_us: int = 0
     host_us: int = 0
+    adapter_us: tuple[int, int] = (0, 0)
+    """From the program to the wire, and from the wire to the program."""
     command: int = 0x101
     answer: int = 0x201
     messages: tuple[Message, ...] = ()
@@ -69,6 +71,7 @@ class Arm(NamedTuple):
             "description": "an arm",
             "bus": {"kind": "can", "bit_rate_kbit_s": 1000, "nodes": self.motors, "access": self.access}
             | {"host_us": self.host_us}
+            | dict(zip(("host_write_us", "host_read_us"), self.adapter_us, strict=True))
             | rate
             | bus,
             "cycle": {"period_us": period_us, "slice_ratio": 1},
@@ -111,13 +114,23 @@ class Arm(NamedTuple):
             for number in range(self.motors)
         ]
         hosts = [[up_to(self.host_us) for _ in motors] for _ in range(CYCLES)]
+        write_us, read_us = self.adapter_us
+        adapter = [[(up_to(write_us), up_to(read_us)) for _ in motors] for _ in range(CYCLES)]
         messages = [
             ((message.identifier, self.us(message.size)), instants)
             for message, instants in zip(self.messages, queued, strict=True)
         ]
         late = 0 if drawn is None else drawn.choice((0, 9))
         starts = [period * cycle for cycle in range(1, CYCLES + 1)]
-        return simulate(motors, messages, starts_us=starts, host_us=hosts, polled=self.access == "polled", late_us=late)
+        return simulate(
+            motors,
+            messages,
+            starts_us=starts,
+            host_us=hosts,
+            polled=self.access == "polled",
+            late_us=late,
+            adapter_us=adapter,
+        )
 
 
 def drawn_arm(random: Random) -> Arm:
@@ -130,6 +143,7 @@ def drawn_arm(random: Random) -> Arm:
         (random.choice((1, 8, 8, 12)), random.choice((1, 8, 8, 20))),
         random.choice((0, 30, 200)),
         random.choice((0, 10, 100)),
+        random.choice(((0, 0), (25, 90), (random.randint(0, 300), random.randint(0, 300)))),
         command,
         answer,
         tuple(
@@ -159,9 +173,9 @@ def drawn_instants(arm: Arm, random: Random, period: int, hurt: list[int]) -> tu
 
 
 def lasts(sent: list[Sent], period: int) -> list[int]:
-    """From the start of each cycle to its last answer."""
+    """From the start of each cycle until the program has its last answer."""
     return [
-        max(frame.end_us for frame in sent if frame.sort == "answer" and frame.cycle == cycle) - period * (cycle + 1)
+        max(frame.known_us for frame in sent if frame.sort == "answer" and frame.cycle == cycle) - period * (cycle + 1)
         for cycle in range(CYCLES)
     ]
 

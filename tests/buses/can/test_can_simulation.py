@@ -82,6 +82,8 @@ class Traffic(NamedTuple):
     errors: tuple[int, int] = (0, 0)
     """Mean time from one error to the next, and how many come at once; 0 without errors."""
     sync_jitter_us: int = 0
+    adapter_us: tuple[int, int] = (0, 0)
+    """The host's adapter, from the wire to the program and from there to the wire."""
     orders: tuple[tuple[str, str], ...] = ()
     """Senders whose queues are not by priority, each with its order; others have queues by priority."""
 
@@ -165,6 +167,7 @@ class Traffic(NamedTuple):
         bus = {"kind": "can", "bit_rate_kbit_s": self.bit_rate, "sync_identifier": self.sync_identifier}
         bus |= {"sync_counter": bool(self.sync_bytes), "host_us": self.host_us}
         bus["sync_jitter_us"] = self.sync_jitter_us
+        bus |= dict(zip(("host_read_us", "host_write_us"), self.adapter_us, strict=True))
         if self.data_bit_rate:
             bus["data_bit_rate_kbit_s"] = self.data_bit_rate
         if self.errors[0]:
@@ -241,6 +244,8 @@ class Moments(NamedTuple):
     late_us: int
     errors_us: Whole = ()
     sync_late_us: Whole = ()
+    adapter_us: tuple[tuple[tuple[int, int], ...], ...] = ()
+    """Of each node in each cycle, up to the longest."""
 
 
 def traffic(random: Random, *, nodes: int) -> Traffic:
@@ -333,6 +338,13 @@ def of_late_syncs(sent: Traffic, random: Random) -> Traffic:
     return (kind(sent, random) if kind else sent)._replace(sync_jitter_us=random.choice([1, 50, 200, 400, 900]))
 
 
+def of_adapter(sent: Traffic, random: Random) -> Traffic:
+    """Traffic of any sort whose host has an adapter."""
+    kind = random.choice([of_both_formats, of_fd, of_rates, of_bursts, of_errors, of_queues, of_late_syncs, None])
+    read_us, write_us = (random.choice([0, 1, 90, random.randint(1, 600)]) for _ in range(2))
+    return (kind(sent, random) if kind else sent)._replace(adapter_us=(read_us, write_us))
+
+
 def of_queues(sent: Traffic, random: Random) -> Traffic:
     """Traffic of any sort whose senders have queues first in, first out, or single buffers."""
     kind = random.choice([of_both_formats, of_fd, of_rates, of_bursts, of_errors, None, None])
@@ -354,6 +366,7 @@ KINDS: Final = {
     "errors": of_errors,
     "queues": of_queues,
     "late SYNCs": of_late_syncs,
+    "adapter": of_adapter,
 }
 """What may become of random traffic of 11 bits."""
 
@@ -417,6 +430,7 @@ def run(own: Scene, at: Moments) -> Run:
         errors_us=at.errors_us,
         error_us=ERROR_BITS * 1000 // sent.bit_rate,
         orders=sent.drawn(at.late_us),
+        adapter_us=at.adapter_us,
     )
 
 
@@ -437,7 +451,22 @@ def moments(own: Scene, random: Random) -> Moments:
         sync_late_us=tuple(some(own.traffic.sync_jitter_us) for _ in range(CYCLES))
         if own.traffic.sync_jitter_us
         else (),
+        adapter_us=_adapter(own, random) if any(own.traffic.adapter_us) else (),
     )
+
+
+def _adapter(own: Scene, random: Random) -> tuple[tuple[tuple[int, int], ...], ...]:
+    """Times of the adapter: always the longest, or each below its own."""
+    read_us, write_us = own.traffic.adapter_us
+    if random.random() < 0.5:
+        return (((read_us, write_us),) * own.traffic.nodes,) * CYCLES
+
+    def each() -> tuple[int, int]:
+        return random.choice((read_us, random.randint(0, read_us))), random.choice(
+            (write_us, random.randint(0, write_us))
+        )
+
+    return tuple(tuple(each() for _ in range(own.traffic.nodes)) for _ in range(CYCLES))
 
 
 def _errors(own: Scene, random: Random, first_us: int | None = None, last: Run | None = None) -> Whole:
@@ -487,7 +516,7 @@ def varied(own: Scene, at: Moments, last: Run, random: Random) -> Moments:
         place = random.randrange(own.traffic.nodes)
         return at._replace(reads_us=_with(at.reads_us, place, fresh.reads_us[place]))
     if what == 1:
-        return at._replace(host_us=fresh.host_us, late_us=fresh.late_us)
+        return at._replace(host_us=fresh.host_us, late_us=fresh.late_us, adapter_us=fresh.adapter_us)
     place = random.randrange(len(at.due_us))
     due_us, queued_us = at.due_us[place], at.queued_us[place]
     if what == 2 or not queued_us:
@@ -566,10 +595,11 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
 @pytest.mark.parametrize(
     ("kind", "first", "networks"),
     [
-        *((kind, 45, at_least(15)) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs")),
+        *((kind, 45, at_least(15)) for kind in KINDS if kind not in ("errors", "queues", "late SYNCs", "adapter")),
         ("errors", 1300, 80),  # it takes as many until the worst of them meet
         ("queues", 90, at_least(20)),
         ("late SYNCs", 75, at_least(15)),
+        ("adapter", 30, at_least(15)),
     ],
 )
 def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str, first: int, networks: int) -> None:

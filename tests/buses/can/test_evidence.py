@@ -11,12 +11,15 @@ FIGURES: list[dict[str, Any]] = EVIDENCE["figures"]
 SYSTEM = FIGURES[-1]
 SEEN = {"CAN: bits of frames of 8 bytes that hardware counted", "CAN: the load of a log"}
 """Sections of what frames on a bus had."""
+FULL = "CAN and CAN FD: frames a second on a full bus"
+ADAPTERS = {"CAN: from program to program over Kvaser's PCIe card", "CAN: an echo of 8 bytes at 500 kbit/s"}
+"""Sections of times that adapters, drivers and programs are in."""
 RULE = "CAN: a vendor's rule for servo drives"
 """A bound with room for more than frames."""
 
 
 def test_each_published_figure_is_met_as_printed() -> None:
-    printed = [figure for figure in FIGURES[:-1] if figure["section"] not in {*SEEN, RULE}]
+    printed = [figure for figure in FIGURES[:-1] if figure["section"] not in {*SEEN, FULL, *ADAPTERS, RULE}]
     assert len(printed) > 20
     for figure in printed:
         decimals = len(str(figure["published"]).partition(".")[2])
@@ -33,23 +36,37 @@ def test_what_was_not_read_again_is_graded_so() -> None:
     for figure in FIGURES:
         grades.setdefault(figure["section"], set()).add(figure["grade"])
     assert grades.pop("CAN: the worst instance is not the first") == {"recalled"}
-    assert {grade for section in SEEN for grade in grades.pop(section)} == {"measured", "derived"}
+    assert {grade for section in (*SEEN, FULL, *ADAPTERS) for grade in grades.pop(section)} == {"measured", "derived"}
     assert set.union(*grades.values()) == {"published"}
 
 
 def test_what_a_bus_had_lies_between_no_stuff_bits_and_the_most(run: Callable[..., CompletedProcess[str]]) -> None:
     seen = [figure for figure in FIGURES if figure["section"] in SEEN]
     over = [figure["relative_residual"] for figure in seen if figure["method"] == "worst stuffing"]
+    full = {(figure["quantity"], figure["method"]): figure for figure in FIGURES if figure["section"] == FULL}
+    for (quantity, method), figure in full.items():
+        slowest, fastest = full[quantity, "worst stuffing"]["computed"], full[quantity, "no stuffing"]["computed"]
+        assert slowest < figure["published"] < fastest, quantity
+        over += [figure["published"] / slowest - 1] if method == "no stuffing" else []
     for figure in seen:
         if figure["method"] == "no stuffing":
             assert figure["relative_residual"] < 0
         elif figure["method"] != "worst stuffing":
             assert abs(figure["relative_residual"]) < 0.04, figure["quantity"]
     # What verdicts say of the model.
-    errs = (
-        f"this timing model gives {100 * min(over):.0f} to {100 * max(over):.0f}% more than measured classical frames"
-    )
+    errs = f"this timing model gives {100 * min(over):.0f} to {100 * max(over):.0f}% more than measured frames"
     assert f"  correction      none: {errs}\n" in run("capacity", "can-servo-8", "--all").stdout
+
+
+def test_what_adapters_and_programs_are_in_has_room_for_its_frames() -> None:
+    own = {(figure["quantity"], figure["method"]): figure for figure in FIGURES if figure["section"] in ADAPTERS}
+    # The 110 us of Kvaser are a rounded frame of 111 bits.
+    assert own["write to read", "no stuffing"]["computed"] == 111 + 25 + 90
+    assert own["write to read", "no stuffing"]["residual"] == 1
+    assert own["there and back, least", "worst stuffing"]["computed"] == 2 * 270
+    assert own["there and back, least", "worst stuffing"]["residual"] < 0
+    loop = [own["loopback of the STM32", method] for method in ("no stuffing", "worst stuffing")]
+    assert loop[0]["computed"] < loop[0]["published"] < loop[1]["computed"]
 
 
 def test_the_papers_can_system_spends_its_time_in_the_host() -> None:

@@ -546,7 +546,12 @@ def test_init_writes_the_time_of_the_host_as_an_assumption(
 
 @pytest.mark.parametrize(
     ("kind", "words"),
-    [("ethercat", "hardware, tuned, real-time, stock"), ("can", "only for --bus ethercat, not for can")],
+    [
+        ("ethercat", "hardware, tuned, real-time, stock"),
+        ("can", "real-time, low-latency, stock"),
+        ("can-motors", "sercos3 or polled, not for can-motors"),
+        ("sercos2", "only for --bus ieee1394, can, ethercat, sercos3 or polled, not for sercos2"),
+    ],
 )
 def test_init_knows_the_hosts_of_a_kind(run: Run, tmp_path: Path, kind: str, words: str) -> None:
     done = run("init", "press", "--bus", kind, "--host", "abacus", cwd=tmp_path)

@@ -61,7 +61,9 @@ def required_us(profile: Profile | Path, model: str = "standard") -> float:
 
 
 def servo(**changes: Any) -> Profile:
-    return changed("dynamixel-arm-14", **changes)
+    """The shipped arm, with a servo's own time of 50 us, without adapter and host."""
+    own: dict[str, Any] = {"node__execution__base_us": 50.0, "bus__adapter": "none", "bus__host_us": 0.0}
+    return changed("dynamixel-arm-14", **{**own, **changes})
 
 
 drives = st.lists(st.tuples(st.integers(1, 244), st.integers(1, 244)), min_size=1, max_size=6)
@@ -113,7 +115,6 @@ def test_profibus_lies_between_its_ends_and_the_ends_are_simulated(
     st.integers(1, 4),
     st.booleans(),
     st.sampled_from([0.0, 250.0, 500.0]),
-    st.sampled_from([0.0, 1000.0, 16000.0]),
 )
 def test_servos_are_those_of_the_simulation(
     protocol: str,
@@ -124,7 +125,6 @@ def test_servos_are_those_of_the_simulation(
     reads: int,
     is_sync: bool,
     delay_us: float,
-    adapter_us: float,
 ) -> None:
     profile = servo(
         bus__protocol=protocol,
@@ -133,7 +133,6 @@ def test_servos_are_those_of_the_simulation(
         bus__reads=reads,
         bus__requests="sync" if is_sync else "single",
         bus__return_delay_us=delay_us,
-        bus__adapter_us=adapter_us,
         payload__read_bytes=read,
         payload__write_bytes=write,
     )
@@ -146,14 +145,13 @@ def test_servos_are_those_of_the_simulation(
         reads=reads,
         is_sync=is_sync,
         turn_us=delay_us + 50,
-        adapter_us=adapter_us,
     )
     assert required_us(profile) == pytest.approx(simulated_us, rel=1e-9)
 
 
 def modbus(rate: float = 19.2, **changes: Any) -> Profile:
     changes = {"bus__nodes": 3, "bus__requests": "exchange", **changes}
-    return servo(bus__protocol="modbus-rtu", bus__bit_rate_kbit_s=rate, bus__adapter_us=0.0, **changes)
+    return servo(bus__protocol="modbus-rtu", bus__bit_rate_kbit_s=rate, **changes)
 
 
 @given(
@@ -189,18 +187,18 @@ def test_uarts_at_the_end_of_their_tolerance_stay_within_u(protocol: str, share:
         if protocol == "modbus-rtu":
             return modbus_us(rate, 3, read=10, write=4, node_us=50, is_exchange=True)
         kind = FEETECH if protocol == "feetech" else DYNAMIXEL
-        return servos_us(kind, rate, 14, read=10, write=4, reads=1, is_sync=True, turn_us=50, adapter_us=0)
+        return servos_us(kind, rate, 14, read=10, write=4, reads=1, is_sync=True, turn_us=50)
 
     rate, tolerance = {"modbus-rtu": (9.6, 0.01), "profibus-dp": (500.0, 0.005)}.get(protocol, (115.2, 0.005))
-    name = "profibus-drives-6" if protocol == "profibus-dp" else "dynamixel-arm-14"
-    changes: dict[str, Any] = {"bus.protocol": protocol, "bus.bit_rate_kbit_s": rate, "bus.adapter_us": 0.0}
-    changes["node.execution.grade"] = "measured"
-    if protocol == "profibus-dp":
-        changes |= {"bus.max_turn_bits": 32.0, "payload.read_bytes": 10, "payload.write_bytes": 10}
-        changes |= {"cycle.nonperiodic_us": 0.0}
+    changes: dict[str, Any] = {"bus__protocol": protocol, "bus__bit_rate_kbit_s": rate}
+    changes |= {"node__execution__grade": "measured", "node__execution__uncertainty_us": None}
     if protocol == "modbus-rtu":
-        changes |= {"bus.nodes": 3, "bus.requests": "exchange"}
-    profile = busplan.load_profile(name, changes=changes)
+        changes |= {"bus__nodes": 3, "bus__requests": "exchange"}
+    if protocol == "profibus-dp":
+        changes |= {"bus__max_turn_bits": 32.0, "payload__read_bytes": 10, "payload__write_bytes": 10}
+        profile = changed("profibus-drives-6", cycle__nonperiodic_us=0.0, **changes)
+    else:
+        profile = servo(**changes)
     moved_us = abs(simulated(rate * (1 + share * tolerance)) - simulated(rate))
     assert moved_us <= uncertainty_us(profile) == pytest.approx(2 / 3**0.5 * moved_us, rel=0.015)
     # Exact clocks are taken, and a tolerance of the user's own.
@@ -230,6 +228,7 @@ def test_feedback_is_in_answers_and_commands_are_in_requests() -> None:
 @pytest.mark.parametrize("protocol", ["modbus-rtu", "dynamixel-2", "feetech"])
 def test_a_longest_turn_around_counts_once(protocol: str) -> None:
     more: Any = {"bus__max_turn_bits": 100.0, "bus__clock_tolerance": 0.0, "node__execution__grade": "measured"}
+    more["node__execution__uncertainty_us"] = None
     if protocol == "modbus-rtu":
         profile = modbus(**more)
         shortest_us, longest_us = (
@@ -237,10 +236,9 @@ def test_a_longest_turn_around_counts_once(protocol: str) -> None:
         )
     else:
         kind = FEETECH if protocol == "feetech" else DYNAMIXEL
-        profile = servo(bus__protocol=protocol, bus__adapter_us=0.0, bus__requests="single", **more)
+        profile = servo(bus__protocol=protocol, bus__requests="single", **more)
         shortest_us, longest_us = (
-            servos_us(kind, 1000, 14, read=10, write=4, reads=1, is_sync=False, turn_us=50 + bits, adapter_us=0)
-            for bits in (0, 100)
+            servos_us(kind, 1000, 14, read=10, write=4, reads=1, is_sync=False, turn_us=50 + bits) for bits in (0, 100)
         )
     middle_us, u_us = required_us(profile), uncertainty_us(profile)
     assert middle_us == pytest.approx((shortest_us + longest_us) / 2, rel=1e-9)
@@ -249,9 +247,7 @@ def test_a_longest_turn_around_counts_once(protocol: str) -> None:
 
 def test_worldfip_by_hand() -> None:
     # 8 bits a byte at 1 Mbit/s: ID_DAT 8 bytes and RP_DAT 9 and its data, a turn-around of 10 to 70 bits behind each.
-    profile = servo(
-        bus__protocol="worldfip", bus__requests="single", bus__nodes=1, bus__adapter_us=0.0, bus__return_delay_us=0.0
-    )
+    profile = servo(bus__protocol="worldfip", bus__requests="single", bus__nodes=1, bus__return_delay_us=0.0)
     read_us = (8 + 9 + 10) * 8 + (10 + 70) / 2 + 70
     write_us = (8 + 9 + 4) * 8 + 2 * 70
     assert required_us(profile) == read_us + write_us
@@ -270,13 +266,6 @@ def test_the_manual_of_profibus_has_its_own_sum() -> None:
     )
     assert required_us(profile, "typical") == pytest.approx(7495 / 1.5)
     assert required_us(profile, "typical") == pytest.approx(4917, rel=0.1)
-
-
-def test_the_published_rates_of_14_servos_are_met() -> None:
-    assert 120 <= 1e6 / required_us(servo()) <= 180
-    assert 60 <= 1e6 / required_us(servo(bus__reads=3)) <= 80
-    (kind,) = busplan.evidence("polled").kinds
-    assert [len(section.comparisons) for section in kind.sections] == [4, 1]
 
 
 @pytest.mark.parametrize(
@@ -363,8 +352,11 @@ def test_a_wrong_protocol_says_where(tmp_path: Path, old: str, new: str, words: 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"bus.protocol": "profinet"}, 'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech" or "worldfip"'),
-        ({"bus.requests": "exchange"}, "it has sync, single"),
+        (
+            {"bus.protocol": "profinet"},
+            'expected "profibus-dp", "modbus-rtu", "dynamixel-2", "feetech", "worldfip" or "mesa-hm2-eth"',
+        ),
+        ({"bus.requests": "exchange"}, "it has sync, fast-sync, single"),
         ({"bus.retries": 1}, "give bus.timeout_us"),
         ({"bus.global_control": True}, "no broadcast that opens a cycle"),
     ],
@@ -391,8 +383,10 @@ def test_limits_of_a_protocol(changes: dict[str, Any], limit: str) -> None:
 def test_a_plan_asks_all_at_once_and_sets_the_return_delay(tmp_path: Path) -> None:
     text = Path("profiles/dynamixel-arm-14.toml").read_text(encoding="utf-8")
     path = tmp_path / "slow.toml"
-    text = text.replace('requests = "sync"', 'requests = "single"').replace(
-        "return_delay_us = 0 ", "return_delay_us = 500 "
+    text = (
+        text.replace('requests = "sync"', 'requests = "single"')
+        .replace("dynamixel-2", "feetech")
+        .replace("return_delay_us = 0 ", "return_delay_us = 500 ")
     )
     path.write_text(text.replace("period_us = 10000", "period_us = 8000"), encoding="utf-8")
     plan = busplan.plan(path, free=["return_delay", "requests"])
@@ -407,7 +401,7 @@ def test_a_command_of_an_exchange_rests_on_the_cycle_before() -> None:
     assert [arm.loop_periods(at_sync=sync) for sync in (False, True)] == [0, 1]
     # Node 1 has its command with the request; all servos have theirs with the sync write at the end.
     assert drives_of.arrival_us(1) == pytest.approx(163.75 + 976 / 12 + (33 + 209) / 12)
-    assert arm.arrival_us(1) == arm.arrival_us(14) == pytest.approx(6760)
+    assert arm.arrival_us(1) == arm.arrival_us(14) == pytest.approx(14 * 50 + 4060)
 
 
 @pytest.mark.parametrize(
@@ -419,6 +413,7 @@ def test_a_command_of_an_exchange_rests_on_the_cycle_before() -> None:
         ("Dynamixel 2", "dynamixel-2"),
         ("feetech", "feetech"),
         ("worldfip", "worldfip"),
+        ("mesa", "mesa-hm2-eth"),
         ("polled", "profibus-dp"),
     ],
 )
@@ -427,6 +422,14 @@ def test_a_new_profile_is_of_the_bus_that_is_asked_for(word: str, protocol: str,
     done = CliRunner().invoke(app, ["init", str(path), "--bus", word, "--nodes", "6", "--axes", "6"])
     assert done.exit_code == 0, done.output
     assert value_at(busplan.load_profile(path), "bus.protocol") == protocol
+
+
+def test_a_thread_of_linuxcnc_by_hand() -> None:
+    """Frames with preamble, header and FCS at 0.08 us a byte, a gap of 12 bytes behind each, and the answer's turn."""
+    request, answer, write = (8 + max(length, 60) + 4 for length in (48, 62, 84))
+    answered_us = (request + 12 + answer) * 0.08 + 47.4
+    assert answered_us == pytest.approx(60, abs=0.1)
+    assert required_us(busplan.load_profile("mesa-hm2-eth")) == pytest.approx(answered_us + (12 + write + 12) * 0.08)
 
 
 def test_a_sweep_is_its_points() -> None:

@@ -31,7 +31,7 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
         "waits for": "wire 116 us, nodes 147 us",
         "largest term": "execution, 147 us",
         "largest doubt": "execution time, +/- 5 us",
-        "rests on": "an instant host, no busy retries, PHYs of 14 ticks and 2 more",
+        "rests on": "an instant host, cycles without jitter and 4 more",
         "never measured": "a cycle node by node; only its transactions were measured",
         "correction": "6.62 us included in used: measured buses take this much longer than the timing model",
         "checked against": "broadcasts (the dVRK)",

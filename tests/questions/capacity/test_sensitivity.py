@@ -36,6 +36,7 @@ WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "one more hop": lambda profile: {"bus.max_hops": value_at(profile, "bus.max_hops") + 1},
     "one more busy retry": lambda profile: {"cycle.retries": value_at(profile, "cycle.retries") + 1},
     "host time +10 us": lambda profile: {"host.transaction_us": profile.host.transaction_us + 10},  # type: ignore[attr-defined]
+    "host's jitter +10 us": lambda profile: {"bus.sync_jitter_us": value_at(profile, "bus.sync_jitter_us") + 10},
     "a bus reset": lambda _one: {"bus.gap_count": 63},
 }
 """Each change as a user would write it into the file."""

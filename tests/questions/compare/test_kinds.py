@@ -1,6 +1,7 @@
 """A machine on several kinds of bus: what stays of it, its smallest period and its most axes."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from busplan.profile.kinds import dotted_keys
 from busplan.questions.compare import MachineOnKind, NotOnKind
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, TRANSACTION_KINDS
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
-from tests.registers import at_least, some
+from tests.registers import SHIPPED_FOLDER, at_least, some
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
 SOME = settings(max_examples=at_least(2))
@@ -83,8 +84,13 @@ def assert_accounted(one: Profile, kind: str) -> None:
         if cables_m and key.rpartition(".")[2] == CABLE:
             assert each.value == max(cables_m.values())
             said[key] = each
+    for name, key in found.of_host.items():
+        assert new[name] == said[key]
+        said[name] = said[key]
     assumed = {each.key: each.value for each in found.assumed}
     for key, value in said.items():
+        if key in found.of_host.values():
+            continue
         out = any(key == each or key.startswith(f"{each}.") for each in found.left_out)
         is_machine = key != "bus.kind" and not key.endswith("execution.grade")
         if value.source == "file" and is_machine:
@@ -141,6 +147,69 @@ def test_the_host_keeps_its_share_of_the_period_and_the_machine_its_cables() -> 
         ("gantry-24", "ethercat", "group.drives.cable_length_m", 0),
     ):
         assert dotted_keys(converted(busplan.load_profile(name), kind).profile)[key].value == cable_length_m
+
+
+OWN_HOSTS = {
+    "paper-1ms": {
+        "host.transaction_us": 7.0,
+        "host.grade": "measured",
+        "host.uncertainty_us": 1.0,
+        "bus.sync_jitter_us": 30.0,
+        "bus.sync_jitter_cycles": 5000,
+    },
+    "can-servo-8": {
+        "bus.host_us": 7.0,
+        "bus.host_grade": "measured",
+        "bus.host_uncertainty_us": 1.0,
+        "bus.sync_jitter_us": 30.0,
+        "bus.sync_jitter_cycles": 5000,
+    },
+    "ethercat-servo-8": {
+        "bus.master_us": 7.0,
+        "bus.master_grade": "measured",
+        "bus.master_uncertainty_us": 1.0,
+        "bus.master_jitter_us": 30.0,
+        "bus.master_jitter_cycles": 5000,
+    },
+    "profibus-drives-6": {
+        "bus.host_us": 7.0,
+        "bus.host_grade": "measured",
+        "bus.host_uncertainty_us": 1.0,
+        "bus.master_jitter_us": 30.0,
+        "bus.master_jitter_cycles": 5000,
+    },
+}
+"""The same host on each kind that knows one."""
+
+
+@pytest.mark.parametrize("name", OWN_HOSTS)
+def test_a_machine_keeps_its_own_host_on_every_kind(name: str) -> None:
+    profile = busplan.load_profile(name, changes=OWN_HOSTS[name])
+    by_kind = {busplan.load_profile(other).bus.kind: keys for other, keys in OWN_HOSTS.items()}
+    for found in busplan.compare(profile).compared:
+        said = {key: each.value for key, each in dotted_keys(found.profile).items()}
+        assert said.items() >= by_kind.get(found.kind, {}).items()
+        assert found.assumed_host == ()
+        # A worst that was measured stays no bound.
+        has_jitter = found.kind != "sercos2"
+        assert ("wake_up" in (found.figures.not_shown or ())) is has_jitter
+    assert not any("Not ranked" in line for line in str(busplan.compare(profile)).splitlines())
+
+
+def test_an_assumed_host_stays_assumed_and_a_pipeline_begins_where_a_kind_allows(tmp_path: Path) -> None:
+    profile = busplan.load_profile("ethercat-servo-8", changes={"bus.pipeline_cycles": 0})
+    on_can, on_ring = (converted(profile, kind) for kind in ("can", "sercos3"))
+    said = {key: each.value for key, each in dotted_keys(on_can.profile).items()}
+    assert (said["bus.host_us"], said["bus.host_grade"], said["bus.pipeline_cycles"]) == (40, "assumed", 0)
+    assert "bus.pipeline_cycles" in on_ring.left_out
+    unranked = {one.name: one.assumed_host for one in busplan.compare(profile, buses=["can", "can-motors"]).compared}
+    assert [[key.key for key in keys] for keys in unranked.values()] == [["bus.host_us"]] * 2
+    # The comment of a time grades it, too.
+    text = (SHIPPED_FOLDER / "profibus-drives-6.toml").read_text(encoding="utf-8")
+    path = tmp_path / "drives.toml"
+    path.write_text(text.replace("[bus]\n", "[bus]\nhost_us = 50 # assumed\n"))
+    on_can = converted(busplan.load_profile(path), "ethercat")
+    assert dotted_keys(on_can.profile)["bus.master_grade"].value == "assumed"
 
 
 @pytest.mark.parametrize(

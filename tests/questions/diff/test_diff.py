@@ -24,6 +24,7 @@ LESS = {
 NEITHER = {
     "timing_model", "period_us", "nodes", "axes", "hops", "gap_count", "safe_gap_count", "available_us",
     "time_slice_us", "limited_by", "binding_term", "bias_us", "uncertainty_us",
+    "cycle_jitter_us",
     "safe_limited_by", "cycle_starts_us", "sync_us", "cycle_arbitration_us", "cycle_data_us", "cycle_acknowledge_us",
     "cycle_hold_us", "cycle_execution_us", "cycle_worst_extra_us", "cycle_idle_us", "cycle_host_us", "retries_us",
     "nonperiodic_us",

@@ -565,8 +565,10 @@ def test_the_help_names_all_faults() -> None:
     from busplan.cli.design import emulate_command  # noqa: PLC0415 - what only this test reads
 
     words = " ".join((emulate_command.__doc__ or "").split())
-    for kind, said in (("EtherCAT", "ethercat"), ("CAN", "can")):
-        assert f"Faults of {kind}: {', '.join(fault.name for fault in FAULTS[said])}." in words
+    *of_sync, error = (fault.name for fault in FAULTS["can"])
+    assert f"Faults of EtherCAT: {', '.join(fault.name for fault in FAULTS['ethercat'])}." in words
+    can = f"{error}; with SYNC {', '.join(of_sync)}; without it {', '.join(OF_REQUESTS)}"
+    assert f"Faults of CAN: {can}." in words
 
 
 @pytest.mark.parametrize(

@@ -82,13 +82,13 @@ def test_equation_2_adds_up_every_term_of_the_cycle(make: Make) -> None:
     both = "CTS + arbitration + data + acknowledge + execution + worst extra + idle"
     terms = {
         "paper": f"{both} + T_npd",
-        "standard": f"cycle starts + {both} + host + retries + T_npd",
+        "standard": f"J + cycle starts + {both} + host + retries + T_npd",
     }
     for model, formula in terms.items():
         needed = derived(make(), "required_us", timing_model=model).steps[-1]
         assert (needed.symbol, needed.reference, needed.formula) == ("T_need", "(2)", formula)
         each = derived(make(), "required_time_slice_us", timing_model=model).steps[-1]
-        added = "" if model == "paper" else " + (cycle starts + retries) / N"
+        added = "" if model == "paper" else " + (J + cycle starts + retries) / N"
         assert (each.symbol, each.reference) == ("T_cs,needed", "(2)")
         assert each.formula == f"(T_r + T_w + T_npd + CTS) / N{added}"
 

@@ -28,7 +28,7 @@ period_us = 20000
 """
 OF_MESSAGE = {"identifier_bits", "per_node", "fd", "brs", "burst", "deadline_us"}
 """What a message is, and when it must have arrived, the user states, too; without a burst, that it has none."""
-KNOWLEDGE = ("grade", "uncertainty_us", "residual", "measured_gap_count")
+KNOWLEDGE = ("grade", "uncertainty_us", "jitter_cycles", "residual", "measured_gap_count")
 """Ends of keys that say how well another value is known: without that value they say nothing."""
 
 

@@ -384,26 +384,29 @@ def test_steps_of_stamps_are_said(tmp_path: Path) -> None:
 
 
 def test_a_pdo_outside_its_own_bound_is_outside_even_where_the_cycle_fits(tmp_path: Path) -> None:
-    """A plan of 10 ms: its feedback may take 1,470 us, and one of the eighth node takes some 6,500."""
-    plan = busplan.load_profile(PLAN, changes={"cycle.period_us": 10_000, "node.execution.grade": "measured"})
-    late = 40
-    queued = [
-        Queued(cycle * 10_000.0 + 150 + 6200 * (node == 8 and cycle == late), 0x180 + node, bytes(8))
-        for cycle in range(100)
-        for node in range(1, 9)
-    ]
-    queued += [Queued(cycle * 10_000.0 + 9000, 0x200 + node, bytes(8)) for cycle in range(100) for node in range(1, 9)]
-    logged = arbitrated([*queued, *(Queued(cycle * 10_000.0, 0x80, b"") for cycle in range(101))])
-    answer = of_log(candump(logged), tmp_path, plan=plan)
-    feedback, worst_us = figure(answer, "feedback: response"), 6200 + 150
-    (at,) = (
-        place for place, frame in enumerate(logged) if frame.identifier == 0x188 and frame.queued.us % 10_000 > 6000
+    """A host that may take 5 ms of 10: feedback has 1,470 us, and once that of the eighth node takes 6,500."""
+    measured = {"node.execution.grade": "measured", "bus.host_grade": "measured"}
+    plan = busplan.load_profile(
+        PLAN, changes={"cycle.period_us": 10_000, "bus.pipeline_cycles": 0, "bus.host_us": 5000, **measured}
     )
-    assert feedback.recorded == pytest.approx(worst_us, abs=300)
-    assert (feedback.verdict, feedback.note) == ("outside", "the latest: feedback of node 8 (0x188)")
+    late_us = {40: 6200.0}
+    queued = []
+    for cycle in range(100):
+        start_us, more_us = cycle * 10_000.0, late_us.get(cycle, 0.0)
+        queued.append(Queued(start_us, 0x80, b""))
+        queued += [Queued(start_us + 150 + more_us * (node == 8), 0x180 + node, bytes(8)) for node in range(1, 9)]
+        queued += [Queued(start_us + 1200 + max(more_us - 900, 0), 0x200 + node, bytes(8)) for node in range(1, 9)]
+    logged = arbitrated(queued)
+    answer = of_log(candump(logged), tmp_path, plan=plan)
+    feedback = figure(answer, "feedback: response")
+    assert [figure.quantity for figure in answer.outside] == ["feedback: response"]
+    (at,) = (place for place, frame in enumerate(logged) if frame.queued.us == 406_350.0)
+    assert (feedback.key, feedback.note) == ("node.execution", "the latest: feedback of node 8 (0x188)")
     assert (feedback.first_frame, feedback.worst_frame) == (at + 1, at + 1)
     assert feedback.first_s == pytest.approx((logged[at].us - logged[0].us) / 1e6, abs=2e-6)
-    assert feedback.first_words in answer.to_text()
+    assert f"first at {feedback.first_s:.6f} s, frame {at + 1}" in str(answer)
+    on_time = figure(answer, "command: response")
+    assert (on_time.verdict, on_time.first_frame) == ("within", None)
 
 
 def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ from tomllib import loads
 from typing import Any, NamedTuple
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import busplan
 from tests.oracles.can_recording import Logged, Queued, arbitrated, candump
@@ -237,6 +239,25 @@ def test_frames_of_others_hide_a_part_of_an_answer(tmp_path: Path) -> None:
     (figure,) = (figure for figure in answer.figures if figure.quantity == "request to answer")
     assert figure.recorded == pytest.approx(700 - logged[0].us, abs=10)
     assert answer.edits == {}
+
+
+ANY = st.builds(
+    Queued,
+    st.integers(0, 60_000).map(float),
+    st.sampled_from([0x141, 0x142, 0x148, 0x241, 0x242, 0x248, 0x50, 0x700]),
+    st.binary(max_size=8),
+)
+
+
+@pytest.mark.parametrize("access", WAYS)
+@given(frames=st.lists(ANY, min_size=1, max_size=80))
+def test_any_log_beside_motors_gives_a_document(
+    tmp_path_factory: pytest.TempPathFactory, access: str, frames: list[Queued]
+) -> None:
+    path = tmp_path_factory.mktemp("any") / "any.log"
+    path.write_text(candump(arbitrated(frames)))
+    plan = busplan.load_profile("can-motors-8", changes={"bus.access": access})
+    assert busplan.measured(plan, path).to_dict()["command"] == "measured"
 
 
 def test_the_gate_names_the_slow_node(tmp_path: Path) -> None:

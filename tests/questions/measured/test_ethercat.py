@@ -96,6 +96,20 @@ def test_period_jitter_and_masters_time_are_found_again_within_u(
     assert doubt < max(spread_us, 0.1)
 
 
+def test_the_jitter_is_the_worst_of_the_cycles_of_the_recording(tmp_path: Path) -> None:
+    seen = of_machine(Machine(), tmp_path)
+    latest, edits = figure(seen, "latest start"), dict(seen.edits)
+    assert edits["bus.master_jitter_cycles"] == latest.events
+    # The worst of more cycles stays where it is kept, and gives way to a later start.
+    for jitter_us, cycles, is_kept in ((500.0, latest.events, True), (500.0, 10, False), (0.001, 10**6, False)):
+        planned = {"bus.master_jitter_us": jitter_us, "bus.master_jitter_cycles": cycles}
+        plan = busplan.load_profile(PLAN, changes=planned)
+        again = busplan.measured(plan, tmp_path / "capture.pcapng").edits
+        assert ("bus.master_jitter_us" not in again) is is_kept
+    rare = busplan.measured(PLAN, tmp_path / "capture.pcapng", quantile=0.99).edits
+    assert rare["bus.master_jitter_cycles"] == 100
+
+
 def test_an_applied_profile_takes_as_long_as_the_machine_did(tmp_path: Path) -> None:
     # Neither the copy of the bytes nor the doubt of the delays is counted twice.
     machine = Machine(jitter_us=0.001, host_spread_us=0.001)

@@ -22,6 +22,16 @@ TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST_STUFFING: Final[TimingModelName] = "worst-stuffing"
 NO_STUFFING: Final[TimingModelName] = "no-stuffing"
 
+_TIMES: Final = ("host_write_us", "host_read_us")
+"""Keys of the adapter's times."""
+
+
+def _is_unknown(cycle: "CanCycle", *names: str) -> bool:
+    """Whether some of these numbers of the host's adapter is neither given nor said by its word."""
+    bus = cycle.network.profile.bus
+    return bus.adapter != "none" and any(bus.of_adapter(name) is None for name in names)
+
+
 PREMISES: Final = (
     Premise("bus.error_period_us", "no repeated frames", 10_000.0),
     Premise("bus.queue", "priority queues", "fifo"),
@@ -29,6 +39,10 @@ PREMISES: Final = (
     Premise("bus.sync_jitter_us", "SYNC without jitter", 50.0),
     Premise("bus.clock_tolerance", "exact clocks", 1e-4),
     Premise("bus.host_us", "an instant host", 100.0, lambda cycle: cycle.waits_for_host),
+    Premise("bus.adapter", "an adapter without delay", "kvaser-pcie", lambda cycle: _is_unknown(cycle, *_TIMES)),
+    Premise("bus.host_write_us", "an adapter without delay", 100.0, lambda cycle: _is_unknown(cycle, "host_write_us")),
+    Premise("bus.host_read_us", "an adapter without delay", 100.0, lambda cycle: _is_unknown(cycle, "host_read_us")),
+    Premise("bus.max_frames_s", "an adapter without ceiling", 5000.0, lambda cycle: _is_unknown(cycle, "max_frames_s")),
     Premise("bus.sync_counter", "SYNC without counter", True),
     Premise("bus.sync_identifier", "SYNC by its usual identifier", 0x700),
     Premise("bus.pipeline_cycles", "commands one cycle later", 2),
@@ -38,7 +52,7 @@ PREMISES: Final = (
 """Premises of a cycle of SYNC; those of other networks are among them."""
 OF_SYNC: Final = frozenset({"bus.sync_jitter_us", "bus.sync_counter", "bus.sync_identifier"})
 """Premises of SYNC."""
-_OF_CYCLE: Final = OF_SYNC | {"bus.host_us", "bus.pipeline_cycles"}
+_OF_CYCLE: Final = OF_SYNC | {"bus.host_us", "bus.pipeline_cycles", "bus.adapter", *(f"bus.{name}" for name in _TIMES)}
 
 
 class CanCycle(BusCycle):
@@ -121,8 +135,6 @@ class CanCycle(BusCycle):
             lines.append(("queues", queues))
         if self.messages:
             lines.append(("latest message", self._latest_words()))
-        if possible_us := self.possible_us():
-            lines.append(("upper bound", f"{self.bound_words} up to {_short(possible_us)} us; they may wait less"))
         tried = range(int(c.MOST_REPEATED) + 1)
         if fits(self._with_burst(0)):
             repeated = bisect_left(tried, 1, lo=1, key=lambda number: not fits(self._with_burst(number))) - 1
@@ -142,11 +154,6 @@ class CanCycle(BusCycle):
         free = sum(message.deadline_us == NO_DEADLINE_US for message, _ in answers)
         others = f"; {plural(free, 'message')} without a deadline" if free else ""
         return f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}{others}"
-
-    @property
-    def bound_words(self) -> str:
-        """Who may wait less than the bound of the cycle says, in words."""
-        return "messages in queues wait"
 
     def _with_burst(self, repeated: int) -> Network:
         """The network with some repeated frames in a row; 0 without errors."""

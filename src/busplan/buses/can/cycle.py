@@ -29,6 +29,7 @@ EVENTS: Final = (
     EventKind("wait", "wait for nodes", "profile", "=", "work"),
     EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "in"),
     EventKind("command_frame", "command PDO", _DAVIS, ">", "out"),
+    EventKind("adapter", "adapter of the host", "profile", "a", "acknowledge"),
     EventKind("host", "host", "profile", "h", "idle"),
     EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
     EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),

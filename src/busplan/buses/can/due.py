@@ -77,7 +77,7 @@ def _places(places: list[int]) -> npt.NDArray[np.int64]:
 
 
 def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """Numbers of the SYNCs at which a PDO of every n-th is due: where most of some neighbours come.
+    """Numbers of the SYNCs at which a PDO of every n-th is due: behind which some neighbours are the least late.
 
     Nodes count the SYNCs that they get, a host counts periods: of both the one is taken by which more PDOs are due.
     """
@@ -85,12 +85,17 @@ def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[
     if every == 1:
         return periods
     comes = np.bincount(np.searchsorted(sync_us, times_us, side="right"), minlength=len(sync_us) + 1)[1:] > 0
-    ways = (_most_common(comes, count % every, every) for count in (periods, is_sent.cumsum()))
+    ways = (_least_late(comes, count % every, every) for count in (periods, is_sent.cumsum()))
     return max(ways, key=lambda due: int(np.count_nonzero(comes[due])))
 
 
-def _most_common(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
-    """Numbers of the SYNCs whose rest is the most common one of their block among those after which a PDO comes."""
+def _least_late(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
+    """Numbers of the SYNCs whose rest is that of their block behind which PDOs are the fewest SYNCs late in all."""
     blocks = np.array_split(np.arange(len(rest)), max(len(rest) // (_BLOCK * every), 1))
-    most = [int(np.bincount(rest[block[comes[block]]], minlength=every).argmax()) for block in blocks]
-    return np.concatenate([block[rest[block] == common] for block, common in zip(blocks, most, strict=True)])
+    due = []
+    for block in blocks:
+        often = np.bincount(rest[block[comes[block]]], minlength=every)
+        # For the next rest those of this one are late by all but a round, and all others by one less.
+        late = np.cumsum(every * often - often.sum())
+        due.append(block[rest[block] == (int(np.argmin(late)) + 1) % every])
+    return np.concatenate(due)

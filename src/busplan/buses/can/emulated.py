@@ -77,12 +77,12 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     """Emulate the log of a machine that keeps its plan, but for the faults.
 
     With SYNC nodes queue their feedback T_exec behind SYNC, and up to the slowest extra time later; the host queues all
-    commands behind the last feedback and half to all of its time. SYNC comes evenly within its jitter. Without SYNC the
-    host queues each request half to all of its time behind the answer before, or, of all at once, behind the request
-    before; a node queues its answer T_exec behind its request, and up to the slowest extra time later. Messages come
-    each by its period and evenly within its jitter, a burst at once. Of a queue that is not by priority one frame is in
-    the arbitration: the first one queued, or of a single buffer the one of the smallest identifier when it became free.
-    Data are random. Stamps count from 0.
+    commands behind the last feedback, its adapter's time, and half to all of its own. SYNC comes evenly within its
+    jitter. Without SYNC the host queues each request likewise behind the answer before, or, of all at once, behind the
+    request before without the adapter; a node queues its answer T_exec behind its request, and up to the slowest extra
+    time later. Messages come each by its period and evenly within its jitter, a burst at once. Of a queue that is not
+    by priority one frame is in the arbitration: the first one queued, or of a single buffer the one of the smallest
+    identifier when it became free. Data are random. Stamps count from 0.
 
     Too many frames, and a fault that the plan has no place for, raise a BusplanError.
     """
@@ -216,7 +216,7 @@ class _Machine:
         else:
             return
         if not self.left[cycle]:
-            now_us += self.random.uniform(LEAST_SHARE, 1) * self.traffic.host_us
+            now_us += self.random.uniform(LEAST_SHARE, 1) * self.traffic.host_us + self.traffic.adapter_us
             late_us = self.emulation.faults.get(LATE.name, 0.0) * (cycle in self.hit[LATE])
             yield from (self._at(now_us + late_us, command, cycle) for command in self._due("command", cycle))
 
@@ -322,8 +322,11 @@ class _Requests(_Machine):
                 yield from self._sent(node.requests, "command", number, cycle, queued_us)
 
     def _host_us(self, number: int, cycle: int) -> float:
-        """Time that the host takes for a request [us]."""
-        own_us: float = self.random.uniform(LEAST_SHARE, 1) * self.network.profile.bus.host_us
+        """Time that the host and its adapter take for a request [us]."""
+        bus = self.network.profile.bus
+        own_us: float = self.random.uniform(LEAST_SHARE, 1) * bus.host_us
+        # Of requests at once all go through the adapter side by side.
+        own_us += 0.0 if self.is_burst else bus.write_us + bus.read_us
         return own_us + self.emulation.faults.get(SLOW_HOST.name, 0.0) * self._is_hit(SLOW_HOST, number, cycle)
 
     def _sent(

@@ -34,6 +34,8 @@ FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 SATURATED: Final = c.unchanged["SATURATED"]
 MOST_STEPS: Final = c.unchanged["MOST_STEPS"]
 
+SECOND_US: Final = 1e6
+
 KBIT_US = 1000
 """Time of a bit at 1 kbit/s [us]."""
 
@@ -246,6 +248,7 @@ class CanFigures(CanMessageFigures):
     cycle_sync_us: float
     cycle_wait_us: float
     cycle_feedback_us: float
+    cycle_adapter_us: float
     cycle_host_us: float
     cycle_command_us: float
     cycle_blocking_us: float

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from busplan.buses.can import equations
-from busplan.buses.can.equations import c
+from busplan.buses.can.equations import SECOND_US, c
 from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import Message, Traffic
 from busplan.buses.can.waiting import message_responses
@@ -38,6 +38,34 @@ def fd_frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, st
     return stuffed(cycle, least=least, most=most, stuffing=stuffing)
 
 
+def frame_us(
+    cycle: object,
+    *,
+    payload_bytes: int,
+    identifier_bits: int,
+    bit_rate_kbit_s: float,
+    stuffing: Stuffing,
+    data_bit_rate_kbit_s: float = 0.0,
+) -> float:
+    """Time of a frame, the space of 3 bits behind it included [us]."""
+    least, most = (
+        equations.frame_us(
+            payload_bytes,
+            identifier_bits=identifier_bits,
+            bit_rate_kbit_s=bit_rate_kbit_s,
+            data_bit_rate_kbit_s=data_bit_rate_kbit_s,
+            is_stuffed=is_stuffed,
+        )
+        for is_stuffed in (False, True)
+    )
+    return stuffed(cycle, least=least, most=most, stuffing=stuffing)
+
+
+def frames_s(cycle: object, **frame: Any) -> float:
+    """Frames a second on a full bus, by the arguments of `frame_us` [1/s]."""
+    return SECOND_US / frame_us(cycle, **frame)
+
+
 def response_us(
     _cycle: object, *, message: int, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]
 ) -> float | None:
@@ -61,4 +89,5 @@ def _messages(bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Seq
     return Traffic(bit_rate_kbit_s=bit_rate_kbit_s, messages=tuple(messages))
 
 
-FUNCTIONS: Final = {function.__name__: function for function in (stuffed, frame_bits, fd_frame_bits, response_us, load)}
+_OF_ROWS: Final = (stuffed, frame_bits, fd_frame_bits, frame_us, frames_s, response_us, load)
+FUNCTIONS: Final = {function.__name__: function for function in _OF_ROWS}

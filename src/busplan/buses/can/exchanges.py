@@ -166,10 +166,10 @@ class RequestLog:
 
     def figures(self, missed: Callable[..., RecordedFigure]) -> Iterator[RecordedFigure]:
         """Figures beside the plan; `missed` makes that of a number that counts against `limits.missed_cycles`."""
-        requests = self._requests()
-        if len(requests.last) < LEAST_EVENTS:
+        if sum(len(found.last) for found in self.found) < LEAST_EVENTS:
             yield missed("answers missing", None, 0, hidden=f"fewer than {LEAST_EVENTS} requests")
             return
+        requests = self._requests()
         yield from self._cycles(requests, missed)
         due = sum(found.due for found in self.found)
         for name in ("missing", "twice"):
@@ -254,8 +254,9 @@ class RequestLog:
         lasts_us = (self.times_us[ends] - self.starts_us[requests.first[opening]])[is_whole]
         worst = quantile(lasts_us, self.share)
         waits_us = [doubt.us for doubt in self.cycle.doubts()]
-        # The host's time before the first request is not on the wire.
-        planned_us = self.cycle.required_us - self.network.nonperiodic_us - self.host_us
+        # The time before the first request and behind the last answer is not on the wire.
+        bus = self.network.profile.bus
+        planned_us = self.cycle.required_us - self.network.nonperiodic_us - bus.host_us - self._adapter_us
         doubt_us = expanded(*waits_us, worst.uncertainty or 0.0)
         figure = RecordedFigure(
             "last answer after the first request",
@@ -284,9 +285,10 @@ class RequestLog:
             )
 
     @property
-    def host_us(self) -> float:
-        """Planned time of the host for a request [us]."""
-        us: float = self.traffic.host_us / self.traffic.requests
+    def _adapter_us(self) -> float:
+        """Time of the host's adapter both ways [us]."""
+        bus = self.network.profile.bus
+        us: float = bus.write_us + bus.read_us
         return us
 
     def _node_times(self) -> Iterator[RecordedFigure]:
@@ -353,14 +355,17 @@ class RequestLog:
         worst = quantile(gaps_us, self.share)
         doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
         behind = "request" if self.traffic.access == "burst" else "answer"
+        # Requests at once wait for no answer to come through the adapter.
+        adapter_us = 0.0 if self.traffic.access == "burst" else self._adapter_us
+        planned_us = self.network.profile.bus.host_us + adapter_us
         note = f"behind the {behind} before, without waits for other frames; {_median(gaps_us, is_exact)}"
         figure = RecordedFigure(
-            quantity, "us", self.host_us, worst.value, doubt_us, "at most", len(first), "bus.host_us", note
+            quantity, "us", planned_us, worst.value, doubt_us, "at most", len(first), "bus.host_us", note
         )
         yield self._located(figure, first, gaps_us)
         if self.traffic.access == "polled" and len(first) >= LEAST_EVENTS:
             self.edits |= {
-                "bus.host_us": ceil(10 * worst.value) / 10,
+                "bus.host_us": max(ceil(10 * (worst.value - adapter_us)) / 10, 0.0),
                 "bus.host_grade": "measured",
                 "bus.host_uncertainty_us": round(doubt_us / 2, 2),
             }

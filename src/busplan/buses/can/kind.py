@@ -76,7 +76,7 @@ class Can(Bus):
         TimingModel(
             WORST_STUFFING,
             "as many stuff bits as a frame of its length can have",
-            error="this timing model gives 8 to 15% more than measured classical frames",
+            error="this timing model gives 8 to 20% more than measured frames",
         ),
         TimingModel(NO_STUFFING, "no stuff bits"),
     )
@@ -97,6 +97,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
             "can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000",
             "can-motors": _MOTORS,
         },
+        without_wake_up=("can-motors",),
         rate="bit_rate_kbit_s",
         more="""\
 # What else goes over the bus? Without it the load is too small. For example of CANopen nodes, each on its own:
@@ -124,10 +125,13 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough"),
         "bus.data_bit_rate_kbit_s": Key("f_data", meaning="if transceivers and cable carry it"),
         "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit"),
-        "bus.host_us": Key("host"),
+        "bus.host_us": Key("host", role="host"),
+        "bus.host_write_us": Key("t_write", meaning="if another adapter or driver is as fast"),
+        "bus.host_read_us": Key("t_read", meaning="if another adapter or driver is as fast"),
+        "bus.max_frames_s": Key("f_max"),
         "bus.pipeline_cycles": Key("n", "PIPELINE_CYCLES", role="pipeline"),
         "bus.clock_tolerance": Key("df"),
-        "bus.sync_jitter_us": Key("J_SYNC"),
+        "bus.sync_jitter_us": Key("J_SYNC", role="wake-up"),
         "bus.error_period_us": Key("T_error"),
         "bus.error_burst": Key("n_burst"),
         "bus.sync_identifier": Key(default="SYNC_IDENTIFIER"),
@@ -141,7 +145,11 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "message.deadline_us": Key("D"),
         "message.identifier": Key("id"),
     }
-    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0}, {"bus.sync_jitter_us": 0.0})
+    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = (
+        {"bus.host_us": 0.0},
+        {"bus.host_write_us": 0.0, "bus.host_read_us": 0.0},
+        {"bus.sync_jitter_us": 0.0},
+    )
     modules = ("evidence", "emulated")
     recordings = "a log of candump, ASC, BLF or TRC, or a capture of SocketCAN,"
     evidence_data = ("can", "paper")
@@ -178,16 +186,17 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A slower host, SYNC later or with its counter, and identifiers of 29 bits; of a network with a cycle."""
+        """A slower host or adapter, SYNC later or with its counter, and identifiers of 29 bits; beside a cycle."""
         bus, is_sync = network.profile.bus, network.profile.bus.access == "sync"
         counted = "SYNC has its counter already" if bus.sync_counter else "" if is_sync else "there is no SYNC"
         extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
         elsewhere = "the host computes in cycles of its own" if is_sync and bus.pipeline_cycles else ""
-        slower = {"bus.host_us": bus.host_us + _HOST_STEP_US}
-        later = {"bus.sync_jitter_us": bus.sync_jitter_us + _HOST_STEP_US}
+        step, of_sync = f"+{_HOST_STEP_US:g} us", "" if is_sync else "there is no SYNC"
         return (
-            Perturbation(f"host +{_HOST_STEP_US:g} us", slower, elsewhere),
-            Perturbation(f"SYNC's jitter +{_HOST_STEP_US:g} us", later, "" if is_sync else "there is no SYNC"),
+            Perturbation(f"host {step}", {"bus.host_us": bus.host_us + _HOST_STEP_US}, elsewhere),
+            Perturbation(f"adapter to the wire {step}", {"bus.host_write_us": bus.write_us + _HOST_STEP_US}, elsewhere),
+            Perturbation(f"adapter from the wire {step}", {"bus.host_read_us": bus.read_us + _HOST_STEP_US}, elsewhere),
+            Perturbation(f"SYNC's jitter {step}", {"bus.sync_jitter_us": bus.sync_jitter_us + _HOST_STEP_US}, of_sync),
             Perturbation("SYNC with counter", {"bus.sync_counter": True}, counted),
             Perturbation("identifiers of 29 bits", {"bus.identifier_bits": 29}, extended),
         )

@@ -58,6 +58,7 @@ def phases(traffic: Traffic, place: int, name: str) -> dict[str, Number]:
         ),
         "frame_us": named(frame_us, "frame_us", "C"),
         "execution_us": 0.0,
+        "adapter_us": 0.0,
         "pipeline_us": 0.0,
         "sync_wait_us": 0.0,
     }

@@ -1,7 +1,7 @@
 """A cycle with PDOs: what a cycle of SYNC shares with one of requests, and its waits for other messages."""
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, partial, reduce
 from itertools import chain
@@ -22,6 +22,7 @@ from busplan.elementwise import (
     FIT_ROUNDING,
     Number,
     choose,
+    is_everywhere,
     is_off,
     larger,
     named,
@@ -31,7 +32,8 @@ from busplan.elementwise import (
     total,
     within,
 )
-from busplan.sections.base import TransactionKind
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.cycle import time_uncertainty_us
 
 
 class PdoCycle(CanCycle):
@@ -67,8 +69,24 @@ class PdoCycle(CanCycle):
         """Frames of lower priorities in a cycle that lasts so long, with some counts of higher ones [us]."""
 
     @abstractmethod
-    def _host_doubt_us(self) -> Number:
-        """Standard uncertainty of the host's own time [us]."""
+    def _of_host_us(self, us: Number) -> Number:
+        """A time of the host's own for each command, in the whole cycle [us]."""
+
+    @abstractmethod
+    def _of_adapter_us(self, us: Number) -> Number:
+        """A time of the host's adapter for each wait of the program, in the whole cycle [us]."""
+
+    def _adapter(self, of_cycle: Callable[[Number], Number]) -> tuple[BusEvent, BusEvent]:
+        """The host's adapter from the wire to the program, and from the program to the wire."""
+        bus = self.network.profile.bus
+
+        def event(name: str, us: Number, way: str) -> BusEvent:
+            return BusEvent("adapter", "cycle_adapter_us", of_cycle(us), way, rests_on=bus.adapter_key(name))
+
+        return (
+            event("host_read_us", bus.read_us, "adapter, from the wire to the program"),
+            event("host_write_us", bus.write_us, "adapter, from the program to the wire"),
+        )
 
     @property
     @abstractmethod
@@ -165,7 +183,8 @@ class PdoCycle(CanCycle):
     @cached_property
     def _terms(self) -> dict[str, Number]:
         """Time of the terms without those of other messages [us]."""
-        keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
+        of_parts = "sync", "wait", "feedback", "adapter", "host", "command"
+        keys = [f"cycle_{name}_us" for name in of_parts]
         return summed(chain.from_iterable(self._parts), keys)
 
     @cached_property
@@ -275,11 +294,22 @@ class PdoCycle(CanCycle):
         return larger(self.required_us - self.of(replace(self.traffic, queues=frozenset())).required_us, 0.0)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The execution time and longer FD frames, by half of what they change; and the host's own time."""
+        """Execution times and longer FD frames, by half of what they change; the host's own time and its adapter's."""
         swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in self.executions)
         key = "node.execution" if self.network.is_uniform else "group.execution"
-        host = Doubt("bus.host_us", "the host's own time", self._host_doubt_us())
-        doubts = Doubt(key, "execution time", swing_us), host
+        bus = self.network.profile.bus
+        doubts = (
+            Doubt(key, "execution time", swing_us),
+            Doubt("bus.host_us", "the host's own time", self._of_host_us(bus.host_doubt_us)),
+            *(
+                Doubt(bus.adapter_key(name), label, self._of_adapter_us(time_uncertainty_us(us, is_guess=False)))
+                for name, label, us in (
+                    ("host_write_us", "the adapter's time to the wire", bus.write_us),
+                    ("host_read_us", "the adapter's time to the program", bus.read_us),
+                )
+                if not is_off(us)
+            ),
+        )
         if self.traffic.longest is self.traffic:
             return doubts
         late_us = (self.of(self.traffic.longest).required_us - self.required_us) / 2
@@ -325,33 +355,52 @@ class PdoCycle(CanCycle):
     @property
     def ends(self) -> tuple[tuple[str, str], ...]:
         """Name and group of the last PDO of each group in each direction."""
-        return tuple((pdos.name, pdos.group) for pdos in self.traffic.pdos)
+        return tuple(
+            (pdos.name, pdos.group) for pdos in self.traffic.pdos if not is_everywhere(pdos.payload_bytes <= 0)
+        )
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case responses, and the way from SYNC to the last executed command."""
         answers = super().latencies()
-        if any(answer.name == LOOP for answer in answers):
+        is_closed = all(any(group.has(kind) for group in self.network.groups) for kind in TRANSACTION_KINDS)
+        if not is_closed or any(answer.name == LOOP for answer in answers):
             return answers
         return *answers, BusLatency(LOOP, None, self._loop())
 
-    def _loop(self) -> dict[str, Number]:
-        """Parts of the way from the instant of SYNC to the last executed command that rests on it, or to its SYNC."""
+    @cached_property
+    def _loop_us(self) -> dict[str, Number]:
+        """Parts of a loop over the host without whole cycles and the wait for SYNC [us]."""
         us = self.by_term
-        parts_us = {
+        return {
             "jitter_us": us["cycle_jitter_us"],
             "blocking_us": us["cycle_blocking_us"],
             "interference_us": us["cycle_interference_us"],
             "backlog_us": 0.0,
             "frame_us": self._in_cycle_us,
             "execution_us": us["cycle_wait_us"] + self.traffic.host_us,
-            "pipeline_us": self._pipeline_cycles * self.network.period_us,
+            "adapter_us": us["cycle_adapter_us"] + self.traffic.lag_us,
         }
-        wait_us: Number = 0.0
+
+    def _loop(self) -> dict[str, Number]:
+        """Parts of the way from the instant of SYNC to the last executed command that rests on it, or to its SYNC."""
+        pipeline_us, wait_us = self._pipeline_cycles * self.network.period_us, 0.0
         if self.takes_at_sync:
-            executed_us = total(us for key, us in parts_us.items() if key != "pipeline_us")
-            wait_us = named(larger(self.network.period_us - executed_us, 0.0), "sync_wait_us", "wait")
-        parts_us["sync_wait_us"] = wait_us
+            late_us = self.network.period_us * self._late_cycles
+            due_us = self.network.period_us if is_off(late_us) else self.network.period_us + late_us
+            wait_us = named(larger(due_us - total(self._loop_us.values()), 0.0), "sync_wait_us", "wait")
+        parts_us = self._loop_us | {"pipeline_us": pipeline_us, "sync_wait_us": wait_us}
         return numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
+
+    @property
+    def _late_cycles(self) -> Number:
+        """Cycles by which commands miss their SYNC for the adapter's time beside the cycle [1]."""
+        if is_off(self.traffic.lag_us):
+            return 0
+        return larger(rounded_up(total(self._loop_us.values()) / self.network.period_us), 1) - 1
+
+    def host_lag_us(self) -> float:
+        """The adapter's time that is in no cycle, for the host computes in cycles of its own [us]."""
+        return self.traffic.lag_us
 
     @property
     def _pipeline_cycles(self) -> Number:
@@ -363,5 +412,6 @@ class PdoCycle(CanCycle):
         return reduce(larger, due)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """The host's pipeline, and the period to the next SYNC."""
-        return super().loop_periods(at_sync=at_sync) + int(self._pipeline)
+        """The host's pipeline, and the periods to the next SYNC."""
+        late = int(self._late_cycles) if at_sync else 0
+        return super().loop_periods(at_sync=at_sync) + int(self._pipeline) + late

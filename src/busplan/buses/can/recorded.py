@@ -12,6 +12,7 @@ from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.equations import BASE_BITS, FD_LENGTHS, bit_us
 from busplan.buses.can.exchanges import RequestLog
 from busplan.buses.can.logged import wire_times
+from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.recorded_cycles import (
     EMERGENCY,
     Ints,
@@ -26,7 +27,7 @@ from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of, latest_start
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -112,19 +113,17 @@ class _Log:
         yield from self._load()
         errors = self._missed("error frames", self.frames.errors, len(self.times_us) + self.frames.errors)
         yield errors.located(self.frames.error_events())
-        sent = self.senders.sent
         yield from self._emergencies()
-        yield from self._cycles(sent)
+        yield from self._cycles()
         responses = {(answer.group, answer.name): answer.phases for answer in self.cycle.latencies()}
         unstuffed = streams(replace(self.traffic, is_stuffed=False))
-        for stream, shortest, label in zip(sent, unstuffed, self.senders.labels, strict=True):
+        for stream, shortest, label in zip(self.senders.sent, unstuffed, self.senders.labels, strict=True):
             phases = responses.get((stream.group, stream.name))
             yield from self._stream(stream, label, self._spread_us(stream, shortest.frame_us, phases))
             yield from self._response(stream, label, shortest.frame_us, phases or {})
         count = len(self.taken)
-        if self.unseen:
+        if unseen := len(self.unseen):
             hidden = f"never in the log: {first_of(self.unseen, can_timing.LISTED)}"
-            unseen = len(self.unseen)
             yield _limited("frames of the plan never in the log", 0, unseen, count, hidden=hidden)
         unplanned = joined(sent.frames for sent in self.unplanned.values())
         note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], can_timing.LISTED)
@@ -191,14 +190,13 @@ class _Log:
             stuffing, number = float((wire_us - none_us)[classical].sum()) / possible_us, int(classical.sum())
             yield RecordedFigure("stuff bits of the possible ones", "share", None, stuffing, None, "shown", number)
 
-    def _cycles(self, sent_streams: Sequence[Stream]) -> Iterator[RecordedFigure]:
+    def _cycles(self) -> Iterator[RecordedFigure]:
         """SYNCs and PDOs that are missing, and the last PDO after its SYNC."""
         if not self.traffic.has_sync:
             yield from self._requests()
             return
-        sync = sent_streams[0]
-        is_extended = sync.identifier_bits > BASE_BITS
-        sent = self.by_identifier.get((sync.first, is_extended))
+        sync = self.senders.sent[0]
+        sent = self.by_identifier.get((sync.first, sync.identifier_bits > BASE_BITS))
         periods = None if sent is None else periodic_events(sent.times_us)
         if sent is None or periods is None:
             few = f"SYNC comes {plural(0 if sent is None else len(sent.times_us), 'time')}"
@@ -216,13 +214,65 @@ class _Log:
             frames, number = np.unique(joined(lost.values()), return_counts=True)
             figure = self._missed(f"PDOs {sort}", int(number.sum()), due, note=first_of(notes, can_timing.LISTED))
             yield self._located(figure, frames, number.astype(np.float64))
-        doubts = tuple(doubt.us for doubt in self.cycle.doubts())
-        yield from self._after_sync("last PDO after SYNC", self.pdos, self._last_us, doubts, _PERIOD)
+        yield from self._after_sync("last PDO after SYNC", self.pdos, self._last_us, self._doubts, _PERIOD)
+        yield from self._host()
+
+    def _host(self) -> Iterator[RecordedFigure]:
+        """The first command behind the last feedback: a log holds the adapter, the host and the adapter in one."""
+        commands = [pdos for pdos in self.pdos if pdos.stream.name == NAMES["write"]]
+        cycles = int(joined(pdos.cycles for pdos in self.pdos).max(initial=-1)) + 1
+        first_us, last_us, number = np.full(cycles, inf), np.full(cycles, -inf), np.zeros(cycles)
+        first = np.zeros(cycles, dtype=np.int64)
+        for pdos in self.pdos:
+            if pdos.stream.name == NAMES["write"]:
+                is_first = pdos.late_us < first_us[pdos.cycles]
+                first_us[pdos.cycles[is_first]], first[pdos.cycles[is_first]] = (
+                    pdos.late_us[is_first],
+                    pdos.frames[is_first],
+                )
+            else:
+                np.maximum.at(last_us, pdos.cycles, pdos.late_us)
+            np.add.at(number, pdos.cycles, 1)
+        is_whole = number == len(self.pdos)
+        gaps_us = (first_us - last_us)[is_whole]
+        if not (isinstance(self.cycle, PdoCycle) and self.cycle.waits_for_host and len(gaps_us)):
+            return
+        us, adapter_us = self.cycle.by_term, self.traffic.adapter_us
+        own_us = self.traffic.host_us + adapter_us
+        waits_us = us["cycle_blocking_us"] + us["cycle_interference_us"]
+        gap = quantile(gaps_us, self.share)
+        # A plan that gives none of them rests on none, and is held to its cycle alone.
+        is_planned = self.network.profile.bus.model_fields_set & {"host_us", "adapter", "host_write_us", "host_read_us"}
+        doubts_us = (doubt.us for doubt in self.cycle.doubts() if doubt.key.startswith("bus."))
+        found = RecordedFigure(
+            "first command after the last feedback",
+            "us",
+            _finite(own_us + waits_us + max(pdos.stream.frame_us for pdos in commands)),
+            gap.value,
+            self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
+            "at most" if is_planned else "shown",
+            len(gaps_us),
+            "bus.host_us",
+            "planned: bus.host_read_us, bus.host_us, bus.host_write_us, the wait for other frames and its own",
+        )
+        if found.verdict == "outside":
+            # Only their sum counts, so what the adapter's keys do not give is the host's. So is what other frames add.
+            shortest = streams(replace(self.traffic, is_stuffed=False))
+            least_us = min(stream.frame_us for stream in shortest if stream.name == NAMES["write"])
+            doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
+            self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
+            self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
+        yield self._located(found, first[is_whole], gaps_us)
 
     @property
     def _last_us(self) -> float:
         """Time that a cycle takes from SYNC on, late or not, by the plan [us]."""
         return float(self.cycle.required_us - self.network.nonperiodic_us - self.traffic.sync_jitter_us)
+
+    @property
+    def _doubts(self) -> list[float]:
+        """Standard uncertainties of this time [us]."""
+        return [doubt.us for doubt in self.cycle.doubts()]
 
     def _after_sync(
         self, quantity: str, some: Sequence[SentPdos], planned_us: float, doubts: Iterable[float], key: str
@@ -257,7 +307,7 @@ class _Log:
         for identifier in np.unique(self.frames.identifiers[found.frames]).tolist():
             self.unplanned.pop((identifier, False), None)
         is_error = found.codes != 0
-        note = first_of(found.words(self.frames, self.senders.by_node_id), can_timing.LISTED, by="; ")
+        note = found.words(self.frames, self.senders.by_node_id, can_timing.LISTED)
         figure = self._missed("emergencies", int(is_error.sum()), len(found.frames), note=note)
         yield self._located(figure, found.frames[is_error])
 
@@ -272,16 +322,14 @@ class _Log:
         sent = [pdos for pdos in self.pdos if pdos.stream == stream]
         if not sent:
             return
-        group = next(group for group in self.network.groups if group.name == stream.group)
-        if stream.name == NAMES["read"]:
-            planned_us = group.read_execution_us + group.worst_extra_us + phases["worst_response_us"]
-            doubts: tuple[float, ...] = (group.read_uncertainty_us,)
-            yield from self._after_sync(quantity, sent, planned_us, doubts, group.key("execution"))
+        if stream.name == NAMES["write"]:
+            # Behind the last command only the slowest execution follows.
+            slowest_us = max(group.write_execution_us + group.worst_extra_us for group in self.network.groups)
+            yield from self._after_sync(quantity, sent, self._last_us - slowest_us, self._doubts, _PERIOD)
             return
-        # Behind the last command only the slowest execution follows.
-        slowest_us = max(group.write_execution_us + group.worst_extra_us for group in self.network.groups)
-        doubts = tuple(doubt.us for doubt in self.cycle.doubts())
-        yield from self._after_sync(quantity, sent, self._last_us - slowest_us, doubts, _PERIOD)
+        group = next(group for group in self.network.groups if group.name == stream.group)
+        planned_us = group.read_execution_us + group.worst_extra_us + phases["worst_response_us"]
+        yield from self._after_sync(quantity, sent, planned_us, [group.read_uncertainty_us], group.key("execution"))
 
     def _message_response(
         self, stream: Stream, quantity: str, shortest_us: float, phases: Mapping[str, Any]
@@ -329,8 +377,8 @@ class _Log:
         recorded = [sent for sent in found.values() if sent is not None]
         for sent in recorded:
             self.unplanned.pop((sent.identifier, is_extended), None)
-        missing = [self.senders.name(stream, identifier) for identifier, sent in found.items() if sent is None]
-        self.unseen += missing if recorded else [label]
+        missing = [identifier for identifier, sent in found.items() if sent is None]
+        self.unseen += [self.senders.name(stream, identifier) for identifier in missing] if recorded else [label]
         if not recorded:
             return
         message = self.messages[stream.name] if stream.is_message else None
@@ -379,7 +427,7 @@ class _Log:
             yield jitter._replace(note=f"planned: {of_host}the wait for other frames and stuff bits")
             if jitter.verdict == "outside":
                 # All of it may be the host's: what other frames add is not known of any one SYNC.
-                self.edits[key] = ceil(10 * late.value) / 10
+                self.edits |= latest_start(key, ceil(10 * late.value) / 10, events=count, share=self.share)
 
     def _message(
         self, stream: Stream, label: str, recorded: Sequence[can_timing.SentFrames], spread_us: float | None
@@ -435,8 +483,10 @@ class _Log:
             f"{key}.jitter_us",
             identifier(sent),
         )
-        most_us = inf if jitter.verdict != "outside" or spread_us is None else spread_us
-        yield self._located(jitter, sent.frames, policed(sent.times_us, least_us, most_us))
+        early_us = ahead(sent.times_us, least_us)
+        if jitter.verdict == "outside" and spread_us is not None:
+            early_us = policed(sent.times_us, least_us, spread_us)
+        yield self._located(jitter, sent.frames, early_us)
         if jitter.verdict == "outside":
             model = can_timing.event_model(
                 sent.times_us, planned_us, stamp_error_us=self.stamp_error_us, tolerance=float(CLOCK_TOLERANCE)

@@ -50,6 +50,7 @@ class Senders:
             for group in network.groups
         }
         """Names of the nodes of each group."""
+        self.all_nodes = [*chain.from_iterable(self.nodes.values())]
 
     def pdos(self) -> Iterator[tuple[Stream, int]]:
         """Each identifier of a PDO with its stream."""
@@ -69,7 +70,7 @@ class Senders:
 
     def node(self, stream: Stream, place: int) -> str:
         """Name of the node that sends the identifier at a place, from 0."""
-        nodes = list(chain.from_iterable(self.nodes.values())) if stream.is_message else self.nodes[stream.group]
+        nodes = self.all_nodes if stream.is_message else self.nodes[stream.group]
         each = max(int(stream.identifiers) // len(nodes), 1)
         number, axis = divmod(place, each)
         return nodes[number] + (f", axis {axis + 1}" if each > 1 else "")
@@ -158,21 +159,23 @@ class Emergencies(NamedTuple):
     registers: Ints
     """Error register of each."""
 
-    def words(self, frames: CanFrames, names: Mapping[int, str]) -> list[str]:
+    def words(self, frames: CanFrames, names: Mapping[int, str], most: int) -> str:
         """Node, error code and register of those that are alike, and when the first of them came, in this order.
 
-        Nodes without a name are called by their node-ID.
+        `names` are those of nodes by their node-ID; the most that are listed are given.
         """
+        sort = self.nodes << 24 | self.codes << 8 | self.registers
+        _, first, often = np.unique(sort, return_index=True, return_counts=True)
+        order = np.argsort(self.frames[first], kind="stable")
         found = []
-        for node, code, register in {*zip(*(part.tolist() for part in self[1:]), strict=True)}:
-            alike = (self.nodes == node) & (self.codes == code) & (self.registers == register)
-            events = frames.events(np.ones(np.count_nonzero(alike)), self.frames[alike])
-            at_s, frame = events.earliest(events.values > 0)
-            often = f", {plural(len(events.values), 'time')}, first" if len(events.values) > 1 else ""
+        for place in order[:most].tolist():
+            event = int(first[place])
+            node, code, register = (int(part[event]) for part in self[1:])
+            at_s, frame = frames.events(np.ones(1), self.frames[event : event + 1]).earliest(np.ones(1, dtype=np.bool_))
+            times = f", {plural(int(often[place]), 'time')}, first" if often[place] > 1 else ""
             words = f"error {code:#06x}, register {register:#04x}" if code else "no error any more"
-            name = names.get(node, f"node-ID {node}")
-            found.append((at_s, frame, f"{name}: {words}{often} at {at_s:.6f} s, frame {frame}"))
-        return [words for *_, words in sorted(found)]
+            found.append(f"{names.get(node, f'node-ID {node}')}: {words}{times} at {at_s:.6f} s, frame {frame}")
+        return "; ".join(found) + (f" and {len(order) - most:,} more" if len(order) > most else "")
 
 
 def emergencies(frames: CanFrames, some: Ints) -> Emergencies:

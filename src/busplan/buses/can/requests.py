@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property, partial
+from itertools import chain
 
 from busplan.buses.can.alone import OF_SYNC, PREMISES
 from busplan.buses.can.pdos import PdoCycle
@@ -14,6 +15,7 @@ from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 class RequestCycle(PdoCycle):
     """Requests and answers: one node after another (polled), or all commands at once (burst), and the window.
 
+    The host's adapter is in each request and answer; of commands at once, before the first and behind the last answer.
     The last answer to commands at once comes no later than all frames and the slowest node together.
     """
 
@@ -26,11 +28,6 @@ class RequestCycle(PdoCycle):
     def _is_burst(self) -> bool:
         """Whether the host sends all commands at once."""
         return self.traffic.access == "burst"
-
-    @property
-    def bound_words(self) -> str:
-        """Who may wait less than the bound of the cycle says, in words."""
-        return "frames of a burst wait" if self._is_burst else super().bound_words
 
     @property
     def takes_at_sync(self) -> bool:
@@ -56,24 +53,34 @@ class RequestCycle(PdoCycle):
     def _requests(self) -> Iterator[Run]:
         """Requests and answers; requests at once all go before the first answer, as the bound has it."""
         host = BusEvent("host", "cycle_host_us", self.network.profile.bus.host_us, "host", rests_on="bus.host_us")
+        read, write = self._adapter(lambda us: us)
         wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest answer")
         commands, answers = [*self._frames("write")], [*self._frames("read")]
         if self._is_burst:
-            yield from (Run((host,), self.traffic.requests), *commands, Run((wait,)), *answers)
+            yield from (
+                Run((host,), self.traffic.requests),
+                Run((write,)),
+                *commands,
+                Run((wait,)),
+                *answers,
+                Run((read,)),
+            )
             return
         for group, command, answer in zip(self._groups, commands, answers, strict=True):
             us = answer_us([group], access="burst")
             executes = wait._replace(us=us, label="wait for the answer", transaction=NAMES["read"])
-            events = (host, *command.events, executes, *answer.events)
-            yield command._replace(events=events, laid_out=partial(self._of_request, host, command, executes, answer))
+            parts = (host, write), command, (executes,), answer, (read,)
+            events = chain.from_iterable(part.events if isinstance(part, Run) else part for part in parts)
+            yield command._replace(events=tuple(events), laid_out=partial(self._of_request, parts))
 
     @staticmethod
-    def _of_request(host: BusEvent, command: Run, wait: BusEvent, answer: Run, number: Number) -> Iterator[BusEvent]:
-        """The frames of a request and of its answer."""
-        for before, run in ((host, command), (wait, answer)):
-            yield before
-            if run.laid_out:
-                yield from run.laid_out(number)
+    def _of_request(parts: Iterable[Run | tuple[BusEvent, ...]], number: Number) -> Iterator[BusEvent]:
+        """The frames of a request and of its answer, with the times between them."""
+        for part in parts:
+            if not isinstance(part, Run):
+                yield from part
+            elif part.laid_out:
+                yield from part.laid_out(number)
 
     def _opened(self, blocking: BusEvent) -> Iterator[BusEvent | Run]:
         yield blocking
@@ -87,9 +94,11 @@ class RequestCycle(PdoCycle):
             return self._terms["cycle_wait_us"] + self._terms["cycle_host_us"]
         return super().possible_us()
 
-    def _host_doubt_us(self) -> Number:
-        doubt_us: Number = self.traffic.requests * self.network.profile.bus.host_doubt_us
-        return doubt_us
+    def _of_host_us(self, us: Number) -> Number:
+        return self.traffic.requests * us
+
+    def _of_adapter_us(self, us: Number) -> Number:
+        return us if self._is_burst else self.traffic.requests * us
 
     @property
     def _pipeline(self) -> Number:

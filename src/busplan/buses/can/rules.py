@@ -8,15 +8,15 @@ from math import inf
 from typing import Final
 
 from busplan.buses.can.cycle import WORST_STUFFING, CanCycle, can_cycle
-from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, c
+from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_STEPS, SATURATED, SECOND_US, c
 from busplan.buses.can.streams import Points, Stream, last_identifier, repeated, streams
 from busplan.buses.can.traffic import NOT_BY_PRIORITY, Traffic, of_node, traffic_of
 from busplan.buses.can.waiting import message_responses
-from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, Limit, NothingUnknown, WakeUp
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
-from busplan.elementwise import Number, choose, larger, pointwise, smaller, total, within
-from busplan.english import first_of
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, pointwise, smaller, total, within
+from busplan.english import first_of, told_apart
 from busplan.sections.base import MAX_TIME_US
 
 
@@ -147,8 +147,9 @@ def _most_identifier(network: Network) -> Number:
 def _largest_pdo(network: Network) -> Number:
     """Largest PDO, or one that is as much over the least room of any as one is over its own [bytes]."""
     largest: Number = 0
+    least_room = _least_room(network)
     for pdos in traffic_of(network).pdos:
-        largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - _least_room(network)))
+        largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - least_room))
     return largest
 
 
@@ -212,6 +213,50 @@ class Load(Limit):
         load, most = self.value(network), network.profile.most_load
         over = f"limits.max_load, {most:.1%}" if most < 1 else "that of a bus"
         return f"{_LOAD} is {load:.1%}, over {over}{_when_full(load)}"
+
+
+class AdapterCeiling(Limit):
+    """All frames of the bus together, on average, must be no more than the host's adapter sends and receives."""
+
+    key = "adapter"
+    label = "the adapter's frames a second"
+    way_out = "a longer period, fewer frames or an adapter that carries more has room"
+    place = "bus.max_frames_s"
+    has_period = True
+
+    def value(self, network: Network) -> Number:
+        """Frames a second over the ceiling; 0 without a ceiling [1]."""
+        most = network.profile.bus.of_adapter("max_frames_s")
+        return 0.0 if most is None else _frames_s(network) / most
+
+    def most(self, _network: Network) -> Number:
+        """1."""
+        return 1
+
+    def shortest_period_us(self, network: Network, *, is_shown: bool) -> Number:  # noqa: ARG002 - nothing is in doubt
+        """The period at which the cycle has the frames that messages leave; infinite where these are too many [us]."""
+        most = network.profile.bus.of_adapter("max_frames_s")
+        if most is None:
+            return 0.0
+        of_messages = _frames_s(network, of_messages=True)
+        of_cycle = (_frames_s(network) - of_messages) * network.period_us
+        return choose(most > of_messages, of_cycle / larger(most - of_messages, FIT_ROUNDING), inf)
+
+    def words(self, network: Network) -> str:
+        """The frames a second, and the most."""
+        most = network.profile.bus.of_adapter("max_frames_s")
+        sent, carried = told_apart(_frames_s(network), most)
+        return f"the bus has {sent} frames a second, over the {carried} of the host's adapter"
+
+
+def _frames_s(network: Network, *, of_messages: bool = False) -> Number:
+    """Mean number of frames a second, of all that is sent, or of messages alone [1/s]."""
+
+    def each_us(traffic: Traffic) -> Number:
+        sent = (one for one in streams(traffic) if one.is_message or not of_messages)
+        return total(one.identifiers / one.period_us for one in sent)
+
+    return SECOND_US * traffic_of(network).ask(each_us, words="identifiers over their periods, of all frames")
 
 
 class KnownPeriods(NothingUnknown):
@@ -324,9 +369,11 @@ LIMITS: Final = (
         is_slow=True,
     ),
     Load(),
+    AdapterCeiling(),
     KnownPeriods(),
     KnownSenders(),
     Deadlines(),
+    WakeUp("bus.sync_jitter_us"),
 )
 
 

@@ -16,7 +16,6 @@ from busplan.buses.can.equations import (
 from busplan.buses.can.traffic import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
 from busplan.sections.base import (
-    GROUPS,
     MAX_TIME_US,
     MIN_STEP_US,
     MISSING,
@@ -26,6 +25,7 @@ from busplan.sections.base import (
     Section,
     TimeUs,
     TransactionKind,
+    groups_field,
 )
 from busplan.sections.cycle import (
     BusSection,
@@ -45,10 +45,17 @@ BitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_BIT_RATE, allow_inf_
 DataBitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_DATA_BIT_RATE, allow_inf_nan=False)]
 PdoBytes = Annotated[
     tuple[Annotated[int, Field(ge=1, le=int(c.unchanged["FD_FRAME_BYTES"]))], ...],
-    Field(strict=False, min_length=1, max_length=int(c.unchanged["MOST_PDOS"])),
+    Field(strict=False, max_length=int(c.unchanged["MOST_PDOS"])),
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 Queue = Literal["priority", "fifo", "single-buffer"]
+FramesPerSecond = Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)]
+_OF_ADAPTER: Final = {
+    "host_write_us": "ADAPTER_WRITE_US",
+    "host_read_us": "ADAPTER_READ_US",
+    "max_frames_s": "ADAPTER_FRAMES_S",
+}
+"""Constants of adapters with a word, by key."""
 _MOST_CYCLES = 1000
 _MOST_MESSAGES = 2048
 """As many as there are identifiers of 11 bits. Each is counted beside all others."""
@@ -91,6 +98,12 @@ class CanBus(BusSection):
         description="Largest delay of SYNC by the host, under the period; it shortens the cycle [us]",
         examples=[50],
     )
+    sync_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
+    )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle; "
@@ -111,6 +124,25 @@ class CanBus(BusSection):
         description="Standard uncertainty of host_us; without it 10 % where that is graded other than assumed, else "
         "host_us / sqrt(3) [us]",
         examples=[5],
+    )
+    adapter: Literal["kvaser-pcie", "candlelight", "none"] | None = Field(
+        default=None,
+        description="Host's adapter by a word, for what the next three keys do not give: kvaser-pcie has mean "
+        "times, candlelight most frames a second; none adds nothing",
+        examples=["kvaser-pcie"],
+    )
+    host_write_us: TimeUs | None = Field(
+        default=None,
+        description="Time of the host's adapter and driver from the program to the wire, known to 10 % [us]",
+        examples=[100],
+    )
+    host_read_us: TimeUs | None = Field(
+        default=None, description="The same from the wire to the program [us]", examples=[100]
+    )
+    max_frames_s: FramesPerSecond | None = Field(
+        default=None,
+        description="Most frames a second that the host's adapter sends and receives, on average",
+        examples=[16_200],
     )
     queue: Queue | None = Field(
         default=None,
@@ -151,6 +183,29 @@ class CanBus(BusSection):
             return self.host_uncertainty_us
         return time_uncertainty_us(self.host_us, is_guess=self.host_grade in (None, "assumed"))
 
+    def adapter_key(self, name: str) -> str:
+        """Dotted key that gives a number of the adapter: its own, or that of the word."""
+        return "bus.adapter" if getattr(self, name) is None and self.adapter else f"bus.{name}"
+
+    def of_adapter(self, name: str) -> Number | None:
+        """A number of the adapter, by its key: as given, or as its word says; None where neither gives it."""
+        given: Number | None = getattr(self, name)
+        return c.get(f"{_OF_ADAPTER[name]}[{self.adapter}]") if given is None else given
+
+    @property
+    def write_us(self) -> Number:
+        """Time from the program to the wire; 0 where it is not known [us]."""
+        return self._adapter_us("host_write_us")
+
+    @property
+    def read_us(self) -> Number:
+        """Time from the wire to the program; 0 where it is not known [us]."""
+        return self._adapter_us("host_read_us")
+
+    def _adapter_us(self, name: str) -> Number:
+        us = self.of_adapter(name)
+        return 0.0 if us is None else us
+
 
 class CanPayload(PayloadSection):
     """Section [payload]: what each node sends (read) and receives (write) in a cycle, and in which PDOs."""
@@ -177,7 +232,8 @@ class CanPayload(PayloadSection):
     )
     feedback_pdos: PdoBytes | None = Field(
         default=None,
-        description="Data of each feedback PDO, up to 8 (CAN FD 64); their sum is the default of read_bytes [bytes]",
+        description="Data of each feedback PDO, up to 8 (CAN FD 64), [] for none; their sum is the default of "
+        "read_bytes [bytes]",
         examples=[[6, 6]],
     )
     command_pdos: PdoBytes | None = Field(
@@ -185,6 +241,13 @@ class CanPayload(PayloadSection):
         description="Data of each command PDO; their sum is the default of write_bytes [bytes]",
         examples=[[6, 6]],
     )
+
+    def _problems(self) -> Iterator[Problem]:
+        for kind in TRANSACTION_KINDS:
+            key = f"{NAMES[kind]}_pdos"
+            if getattr(self, key) == () and any(self._parts(kind)):
+                why = f"is empty, so nothing is sent, and {self.key_of(kind)} has data; give one of the two"
+                yield Problem(why, key=key, kind="inconsistent")
 
     def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
         fixed, per_axis = super()._parts(kind)
@@ -288,15 +351,18 @@ _OF_CYCLE: Final = {
         "sync_identifier",
         "sync_counter",
         "sync_jitter_us",
+        "sync_jitter_cycles",
         "pipeline_cycles",
         "host_us",
         "host_grade",
         "host_uncertainty_us",
+        "host_write_us",
+        "host_read_us",
     ),
     "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
 }
 """Keys of sections that only a network with a cycle has."""
-_OF_SYNC: Final = ("sync_identifier", "sync_counter", "sync_jitter_us")
+_OF_SYNC: Final = ("sync_identifier", "sync_counter", "sync_jitter_us", "sync_jitter_cycles")
 """Keys of section [bus] that only a cycle with SYNC has."""
 _PDO_NAMES: Final = tuple(NAMES.values())
 
@@ -312,7 +378,7 @@ class CanProfile(Profile):
     )
     payload: CanPayload | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: CanNode | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[CanGroup, ...], GROUPS] = Field(
+    group: Annotated[tuple[CanGroup, ...], groups_field(c.unchanged["MOST_NODES"])] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
     message: Annotated[tuple[CanMessage, ...], Field(strict=False, max_length=_MOST_MESSAGES)] = Field(

@@ -10,7 +10,7 @@ from busplan.buses.can.traffic import SYNC, Traffic
 from busplan.buses.can.waiting import longest_cycle, sync_response
 from busplan.buses.cycle import BusEvent, Run
 from busplan.buses.network import Group
-from busplan.elementwise import Number, choose, larger
+from busplan.elementwise import Number, choose, is_off, larger
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 
@@ -18,8 +18,9 @@ class SyncCycle(PdoCycle):
     """SYNC's jitter, SYNC, the wait for the slowest node, feedback PDOs, the host, command PDOs, and the window.
 
     All nodes execute at once: feedback waits for the slowest of them, and so does the next SYNC behind the commands.
-    Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire; frames of higher
-    priorities go whenever they are queued.
+    The host's adapter comes before and behind the host. It holds up SYNC, too, each by the same time: what it varies by
+    is SYNC's jitter. Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire;
+    frames of higher priorities go whenever they are queued.
     """
 
     premises = PREMISES
@@ -49,11 +50,12 @@ class SyncCycle(PdoCycle):
         ready = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
         host_us = self.traffic.host_us if self._groups else 0.0
         host = BusEvent("host", "cycle_host_us", host_us, "host", rests_on="bus.host_us")
+        read, write = self._adapter(self._of_adapter_us if self._groups else lambda _: 0.0)
         executed_us = self._wait_us("write")
         executed = BusEvent("wait", "cycle_wait_us", executed_us, "wait for the slowest execution of a command")
         return (
             (Run((sync,)), Run((ready,))),
-            (*self._frames("read"), Run((host,))),
+            (*self._frames("read"), Run((read, host, write))),
             (*self._frames("write"), Run((executed,))),
         )
 
@@ -75,9 +77,10 @@ class SyncCycle(PdoCycle):
         words = "the 3 longest frames of a lower priority that can be there in w"
         return self._waited("blocking_us", others_us, words)
 
-    def _host_doubt_us(self) -> Number:
-        bus = self.network.profile.bus
-        return choose(bus.pipeline_cycles > 0, 0.0, bus.host_doubt_us)
+    def _of_host_us(self, us: Number) -> Number:
+        return 0.0 if is_off(us) else choose(self._pipeline > 0, 0.0, us)
+
+    _of_adapter_us = _of_host_us
 
     @property
     def _pipeline(self) -> Number:
@@ -102,10 +105,6 @@ class SyncCycle(PdoCycle):
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:
     """The slowest execution of a group's nodes, with some standard uncertainties [us]."""
-    execution_us, doubt_us = (
-        (group.read_execution_us, group.read_uncertainty_us)
-        if kind == "read"
-        else (group.write_execution_us, group.write_uncertainty_us)
-    )
-    slowest_us = execution_us + group.worst_extra_us
+    doubt_us = group.read_uncertainty_us if kind == "read" else group.write_uncertainty_us
+    slowest_us = group.slowest_us(kind)
     return slowest_us + uncertainties * doubt_us if uncertainties else slowest_us

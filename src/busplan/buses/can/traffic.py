@@ -128,6 +128,10 @@ class Traffic:
     """Slowest execution of any node, from SYNC to its queued feedback [us]."""
     host_us: Number = 0.0
     """Host's time from the last feedback to the queued commands [us]."""
+    adapter_us: Number = 0.0
+    """Time of the host's adapter in the cycle [us]."""
+    lag_us: Number = 0.0
+    """Time of the adapter in the age of feedback and command that is in no cycle [us]."""
     sync_jitter_us: Number = 0.0
     """Latest queueing of SYNC behind the start of its period [us]."""
     error_period_us: Number = MAX_TIME_US
@@ -311,15 +315,24 @@ def _traffic_of(network: Network) -> Traffic:
             _pdos(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
         ),
     )
+    adapter_us = bus.write_us + bus.read_us
     if not traffic.has_sync:
-        return replace(traffic, read_us=answer_us(groups, access=bus.access), host_us=traffic.requests * bus.host_us)
+        return replace(
+            traffic,
+            read_us=answer_us(groups, access=bus.access),
+            host_us=traffic.requests * bus.host_us,
+            adapter_us=adapter_us if bus.access == "burst" or is_off(adapter_us) else traffic.requests * adapter_us,
+        )
+    has_adapter = not is_off(adapter_us)
     return replace(
         traffic,
+        adapter_us=choose(bus.pipeline_cycles > 0, 0.0, adapter_us) if has_adapter else 0.0,
+        lag_us=choose(bus.pipeline_cycles > 0, adapter_us, 0.0) if has_adapter else 0.0,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
         # A punctual SYNC is no input of a derivation.
         sync_jitter_us=_unless(bus.sync_jitter_us, 0),
-        read_us=reduce(larger, (group.read_execution_us + group.worst_extra_us for group in groups)),
+        read_us=reduce(larger, (group.slowest_us("read") for group in groups)),
         # Where the host computes in a cycle of its own, it takes no time of this one.
         host_us=choose(bus.pipeline_cycles > 0, 0.0, bus.host_us),
     )
@@ -376,9 +389,10 @@ def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> P
     if identifier is None:
         identifier = int(c[_FIRST[kind]]) if is_first else FOLLOWS
     number = of_node(group)
-    payload_bytes = share_bytes(group.read_bytes if kind == "read" else group.write_bytes, pdos=number)
+    payload_bytes = share_bytes(group.bytes_of(kind), pdos=number)
     frame_bytes = (c.FRAME_BYTES if bus.data_bit_rate_kbit_s is None else c.FD_FRAME_BYTES,)
-    lengths = getattr(payload, f"{NAMES[kind]}_pdos")
+    # No PDOs have no lengths.
+    lengths = getattr(payload, f"{NAMES[kind]}_pdos") or None
     return Pdos(
         kind,
         group.name,

@@ -324,12 +324,12 @@ def busy_starts(sent: Sequence[Stream], traffic: Traffic) -> list[BusyStart]:
     for stream in sent:
         if not stream.is_message:
             us[stream.name] = us[stream.name] + stream.frames_us
-    others_us = total(us.values()) + traffic.read_us + traffic.host_us
+    others_us = total(us.values()) + traffic.read_us + traffic.host_us + traffic.adapter_us
     lasts_us = _longest_cycle(sent, traffic, others_us).lasts_us
     if not traffic.has_sync or any(stream.queue_place is not None and not stream.is_message for stream in sent):
         return [BusyStart(), BusyStart((_FEEDBACK, _COMMAND), lasts_us, traffic.period_us)]
     commands_us = lasts_us - us[_COMMAND]
-    feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
+    feedback_us = commands_us - traffic.host_us - traffic.adapter_us - us[_FEEDBACK]
     return [
         BusyStart(),
         BusyStart((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us),

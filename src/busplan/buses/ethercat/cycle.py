@@ -306,10 +306,9 @@ class EthercatCycle(BusCycle):
         last_us = self.arrival_us(int(network.nodes))
 
         def waits(group: Group) -> float:
-            extra_us = group.worst_extra_us
-            sampled = _until_taken((shift_us + group.read_execution_us + extra_us) / period_us)
-            late_us = last_us + group.write_execution_us + extra_us - shift_us
-            return sampled + (max(rounded_up(late_us / period_us), 0) if at_sync else 0)
+            sampled = _until_taken((shift_us + group.slowest_us("read")) / period_us) if group.has("read") else 1
+            late_us = last_us + group.slowest_us("write") - shift_us
+            return sampled + (max(rounded_up(late_us / period_us), 0) if at_sync and group.has("write") else 0)
 
         groups = [group for group in network.groups if not group.is_slower] or network.groups
         return int(max(map(waits, groups)) + network.profile.bus.pipeline_cycles)
@@ -322,7 +321,14 @@ class EthercatCycle(BusCycle):
             # The master's pipeline begins with the cycle that brings the feedback.
             drive_us = feedback["drive_us"] + command["drive_us"]
             loop = {**command, "drive_us": drive_us, "frame_wait_us": feedback["frame_wait_us"]}
-            for name, phases in (("command", command), ("feedback", feedback), ("loop", loop)):
+            is_read, is_written = group.has("read"), group.has("write")
+            for name, phases, is_there in (
+                ("command", command, is_written),
+                ("feedback", feedback, is_read),
+                ("loop", loop, is_read and is_written),
+            ):
+                if not is_there:
+                    continue
                 whole_us = {LATENCY_TABLE[-1].key: total(phases.values())}
                 latencies.append(BusLatency(name, None, phases | whole_us, group.name))
         return tuple(latencies)
@@ -330,7 +336,8 @@ class EthercatCycle(BusCycle):
     @property
     def last_command_us(self) -> Number:
         """Latest time from the master's task until the last device has taken its command [us]."""
-        return reduce(larger, map(self._taken_us, self.network.groups))
+        taken_us = (group.if_any("write", self._taken_us(group)) for group in self.network.groups)
+        return reduce(larger, taken_us)
 
     @property
     def command_doubt_us(self) -> Number:
@@ -360,7 +367,7 @@ class EthercatCycle(BusCycle):
         """Latest time at which a group has taken its command, as if it stood at the end of the segment [us]."""
         bus = self.bus
         on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
-        return on_wire_us + group.write_execution_us + group.worst_extra_us
+        return on_wire_us + group.slowest_us("write")
 
     def _command(self, group: Group) -> dict[str, Number]:
         """Phases of a command, from the cycle with the feedback it is computed from to its effect [us]."""
@@ -371,7 +378,7 @@ class EthercatCycle(BusCycle):
             late = larger(rounded_up((taken_us - sync0_us(network)) / network.period_us), 0)
             wait_us = sync0_us(network) + late * network.period_us - taken_us
         return {
-            "drive_us": group.write_execution_us + group.worst_extra_us,
+            "drive_us": group.slowest_us("write"),
             "frame_wait_us": 0.0,
             "pipeline_us": named(bus.pipeline_cycles * _period_us(group, network), "pipeline_us", "n T_s"),
             "master_us": bus.master_us,
@@ -384,7 +391,7 @@ class EthercatCycle(BusCycle):
     def _feedback(self, group: Group) -> dict[str, Number]:
         """Phases of feedback, from the sample through the wait for a frame until the master has all frames [us]."""
         network, bus = self.network, self.bus
-        ready_us = group.read_execution_us + group.worst_extra_us
+        ready_us = group.slowest_us("read")
         ready_at_us = sync0_us(network) + ready_us
         period_us = _period_us(group, network)
         return {

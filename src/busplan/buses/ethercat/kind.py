@@ -36,6 +36,7 @@ from busplan.buses.limits import (
     ShareOfPeriod,
     Starter,
     TimingModel,
+    WakeUp,
     nodes_limit,
 )
 from busplan.buses.network import Group, Network
@@ -146,6 +147,7 @@ LIMITS: Final = (
     ),
     BeforeSync0(),
     SyncWindow(),
+    WakeUp("bus.master_jitter_us"),
 )
 
 
@@ -184,14 +186,6 @@ _PROCESS_DATA = "bus.process_data"
 _MASTER_STEP_US = 10.0
 
 
-def _host(us: int, source: str) -> str:
-    """Lines of [bus] for a host whose time is assumed."""
-    time = f"master_us = {us}".ljust(26)
-    return f"""\
-{time} # assumed: {source}; measure it
-master_grade = "assumed"   # between 0 and twice its value"""
-
-
 class Ethercat(Bus):
     """EtherCAT: the master's frames pass all devices in every cycle."""
 
@@ -215,12 +209,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
 # port = "E-bus"           # of terminals on a backplane; default 100BASE-TX
 # cable_length_m = 10      # from the device before it; default 0
 """,
-        hosts={
-            "hardware": _host(5, "a master in hardware or a kernel driver of its own: a few us"),
-            "tuned": _host(40, "a tuned Linux with its own driver: round trips less wire of 20 to 40 us"),
-            "real-time": _host(250, "PREEMPT_RT with a stock driver: round trips less wire of 190 to 310 us"),
-            "stock": _host(560, "stock Linux or Windows: round trips less wire of 500 to 560 us"),
-        },
         host="tuned",
         slice_ratio="1            # assumed: the master computes in the next cycle with what it received in this one",
         measure="measure both on a drive: SYNC0 to its feedback, frame to command taken; no frame waits for them",
@@ -232,7 +220,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="move the other devices to a second segment"),
         "bus.master_us": Key("T_master", role="host"),
-        "bus.master_jitter_us": Key("J"),
+        "bus.master_jitter_us": Key("J", role="wake-up"),
         "bus.mailbox_polls": Key("polls"),
         "bus.mailbox_bytes": Key("B", "MAILBOX_BYTES"),
         "bus.sync_shift": Key("shift", "SYNC_SHIFT", meaning="drives act, and sample, later"),

@@ -26,7 +26,7 @@ from busplan.buses.ethercat.frames import (
 from busplan.buses.ethercat.port_times import line_delays
 from busplan.buses.ethercat.recorded_cycles import Ints, SeenCycles, seen_cycles, trips
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of, latest_start
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -35,7 +35,6 @@ from busplan.recordings.ethercat import COMMANDS, Datagram, EthercatFrames, read
 from busplan.recordings.statistics import (
     LEAST_EVENTS,
     Floats,
-    Lateness,
     Quantile,
     expanded,
     lateness,
@@ -129,7 +128,7 @@ class Seen:
             self.cycles = seen_cycles(sent, times_us, kinds, self.data_bytes[sent], network)
         self.bad_stamps = self._why_bad_stamps()
         """Reason why stamps give no durations; empty where they do."""
-        self.jitter: Lateness | None = None
+        self.jitter: dict[str, object] = {}
         self.master: Quantile | None = None
         self.master_bytes: list[int] | None = None
         """Data of the master's own datagrams, if not as planned [bytes]."""
@@ -205,8 +204,11 @@ class Seen:
         yield RecordedFigure("standard deviation of the period", "us", None, deviation_us, None, "shown", count - 1)
         latest = lateness(periods, self.share)
         is_hidden = self.stamp_us > max(jitter_us, latest.value)
-        if not (is_hidden or self.bad_stamps):
-            self.jitter = latest
+        # The worst of more cycles stays where the recording keeps it.
+        planned = self.network.profile.bus.master_jitter_cycles
+        is_kept = latest.value <= jitter_us and planned is not None and planned >= count
+        if not (is_hidden or self.bad_stamps or is_kept):
+            self.jitter = latest_start(_JITTER, _up(latest.value), events=count, share=self.share)
         start = start._replace(
             recorded=latest.value,
             uncertainty=expanded(latest.uncertainty, self.stamp_us * _TWO_STAMPS),
@@ -450,8 +452,7 @@ class Seen:
             # The cycle already counts the uncertainty of the devices' delays.
             doubt = expanded(self.master.uncertainty, self.stamp_us * _TWO_STAMPS)
             edits["bus.master_uncertainty_us"] = None if doubt is None else round(doubt / 2, 4)
-        if self.jitter is not None:
-            edits[_JITTER] = _up(self.jitter.value)
+        edits |= self.jitter
         if self.master_bytes is not None:
             edits["bus.housekeeping_bytes"] = self.master_bytes
         return edits

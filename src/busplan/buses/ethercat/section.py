@@ -17,7 +17,7 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.ethercat.frames import MOST_CYCLES, checked_hyperperiod
 from busplan.elementwise import Number
 from busplan.errors import BusplanError
-from busplan.sections.base import GROUPS, MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MISSING, Bytes, Count, Problem, TimeUs, groups_field, refused
 from busplan.sections.cycle import (
     BusSection,
     Execution,
@@ -93,6 +93,12 @@ class EthercatBus(BusSection):
     )
     master_jitter_us: TimeUs = Field(
         default=0.0, description="Latest start of the frames after the task [us]", examples=[20]
+    )
+    master_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
@@ -188,7 +194,7 @@ class EthercatProfile(Profile):
     bus: EthercatBus = Field(description="The bus")
     payload: PayloadSection | None = Field(default=None, description="Payload of a cycle, where nodes are alike")
     node: EthercatNode | None = Field(default=None, description="One device, where nodes are alike")
-    group: Annotated[tuple[EthercatGroup, ...], GROUPS] = Field(
+    group: Annotated[tuple[EthercatGroup, ...], groups_field()] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
 

@@ -24,18 +24,21 @@ from busplan.buses.ieee1394.cycle import CycleWithStarts
 from busplan.buses.ieee1394.doubts import ACKNOWLEDGED, CONCATENATED, UNACKNOWLEDGED
 from busplan.buses.ieee1394.timing import IdleTime, Phases, Responder, idle_time, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, is_off, larger, step, total
+from busplan.elementwise import Number, choose, is_everywhere, is_off, larger, step, total
 from busplan.sections.base import TransactionKind
 
 
 def hub_block_bytes(network: Network) -> Number:
     """Payload of the hub's block: a sequence quadlet and the data of each node, and one timing quadlet [bytes]."""
-    return total(group.nodes * _with_quadlet(group.read_bytes) for group in network.groups) + c.HUB_TIMING_BYTES
+    return (
+        total(group.nodes_with("read") * _with_quadlet(group.read_bytes) for group in network.groups)
+        + c.HUB_TIMING_BYTES
+    )
 
 
 def write_block_bytes(network: Network) -> Number:
     """Payload of the write: a header quadlet and the command of each node [bytes]."""
-    return total(group.nodes * _with_quadlet(group.write_bytes) for group in network.groups)
+    return total(group.nodes_with("write") * _with_quadlet(group.write_bytes) for group in network.groups)
 
 
 def _with_quadlet(payload_bytes: Number) -> Number:
@@ -71,9 +74,19 @@ class BroadcastCycle(CycleWithStarts):
         return 0.0 if self._is_isochronous else self.delays.gaps.subaction_us
 
     @cached_property
+    def _broadcasting(self) -> tuple[Group, ...]:
+        """Groups that broadcast data."""
+        return tuple(group for group in self.network.groups if group.has("read"))
+
+    def _if_any(self, kind: TransactionKind, number: Number) -> Number:
+        """A number of the broadcasts and the read of the hub, or of the write; 0 where no node has data for it."""
+        nodes = total(group.nodes_with(kind) for group in self.network.groups)
+        return number if is_everywhere(nodes > 0) else choose(nodes > 0, number, 0.0)
+
+    @cached_property
     def first_wait_us(self) -> Number:
         """Wait of the first node after the query, beyond its gap [us]."""
-        return larger(self._clocks_us(c.FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
+        return self._if_any("read", larger(self._clocks_us(c.FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0))
 
     def _clocks_us(self, clocks: Number) -> Number:
         return clocks / c.BROADCAST_CLOCK_MHZ
@@ -91,8 +104,11 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def slot_waits_us(self) -> Number:
         """Wait of all nodes after the first for their own times [us]; no wait follows the last broadcast."""
-        groups = self.network.groups
-        return total(group.nodes * self.slot_wait_us(group) for group in groups) - self.slot_wait_us(groups[-1])
+        last_us: Number = 0.0
+        for group in self._broadcasting:
+            last_us = choose(group.bytes_of("read") > 0, self.slot_wait_us(group), last_us)
+        groups = self._broadcasting
+        return total(group.nodes_with("read") * self.slot_wait_us(group) for group in groups) - last_us
 
     @cached_property
     def arbitration_us(self) -> Number:
@@ -108,16 +124,21 @@ class BroadcastCycle(CycleWithStarts):
         return self.delays.data_us(c.BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
 
     @property
+    def _broadcasts(self) -> Number:
+        """Broadcasts of a cycle [1]."""
+        return total(group.nodes_with("read") for group in self.network.groups)
+
+    @property
     def node_waits_us(self) -> Number:
         """Idle bus before all broadcasts [us]."""
-        return self.first_wait_us + self.network.nodes * self.gap_us + self.slot_waits_us
+        return self.first_wait_us + self._broadcasts * self.gap_us + self.slot_waits_us
 
     @cached_property
     @step("T_boards")
     def boards_us(self) -> Number:
         """Time of all broadcasts, gaps included [us]."""
         each_us = self.gap_us + self.arbitration_us
-        sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
+        sent_us = total(group.nodes_with("read") * (each_us + self.broadcast_us(group)) for group in self._broadcasting)
         return self.first_wait_us + sent_us + self.slot_waits_us
 
     @cached_property
@@ -133,14 +154,17 @@ class BroadcastCycle(CycleWithStarts):
         return self._transaction("write", write_block_bytes(self.network), responder)
 
     def _transaction(self, kind: TransactionKind, payload_bytes: Number, responder: Responder) -> Phases:
-        return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
+        phases = transaction(
+            kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder
+        )
+        return Phases(*(self._if_any(kind, us) for us in phases))
 
     @cached_property
     @step("late")
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
         wait_us = c.HUB_WAIT_US + c.HUB_WAIT_PER_NODE_US * self.network.nodes
-        return larger(wait_us - self.boards_us, 0.0)
+        return self._if_any("read", larger(wait_us - self.boards_us, 0.0))
 
     @cached_property
     def hub_wait(self) -> IdleTime:
@@ -149,11 +173,12 @@ class BroadcastCycle(CycleWithStarts):
         The host waits 10 + 5 N us after the query and does not watch the broadcasts. Its own time follows that wait, or
         the last broadcast if it ends later.
         """
-        return self._idle(self.late_us + self.host_us)
+        return self._idle(self.late_us + self.host_us, "read")
 
-    def _idle(self, host_us: Number) -> IdleTime:
+    def _idle(self, host_us: Number, kind: TransactionKind) -> IdleTime:
         """Idle bus before a request of the host, whose own time overlaps the gap."""
-        return idle_time("unified", gaps=self.delays.gaps, execution_us=0.0, host_us=host_us)
+        idle = idle_time("unified", gaps=self.delays.gaps, execution_us=0.0, host_us=host_us)
+        return IdleTime(*(self._if_any(kind, us) for us in idle))
 
     @property
     def host_us(self) -> Number:
@@ -169,6 +194,8 @@ class BroadcastCycle(CycleWithStarts):
         )
         yield BusEvent("sync", "sync_us", self.query_us, "query to all nodes")
         for place, group in enumerate(self.network.groups):
+            if not group.has("read"):
+                continue
             wait, next_us = response("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
             events = (
                 response("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
@@ -177,8 +204,8 @@ class BroadcastCycle(CycleWithStarts):
                 response("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
                 response("response_data", "data", self.broadcast_us(group), "node broadcast"),
             )
-            yield Run(events, group.nodes, place)
-            waits_us = next_us
+            yield Run(tuple(event._replace(us=group.if_any("read", event.us)) for event in events), group.nodes, place)
+            waits_us = choose(group.bytes_of("read") > 0, next_us, waits_us)
         read_hub = (
             request("arbitration", "arbitration", delays.arbitration_us, "host arbitration"),
             request("request_data", "data", hub.request_data_us, "host request to the hub"),
@@ -191,10 +218,14 @@ class BroadcastCycle(CycleWithStarts):
             write("request_data", "data", self.write.request_data_us, "commands to all nodes"),
             write("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
         )
-        after = IdleTime(hub.idle_us, hub.host_us)
-        yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
-        yield Run((*_waits(after, "after the hub's block"), *write_hub))
-        yield Run(_waits(after, "after the write"))
+        parts: tuple[tuple[TransactionKind, tuple[BusEvent, ...]], ...] = (
+            ("read", (*_waits(self.hub_wait, "before the hub is read"), *read_hub)),
+            ("read", _waits(IdleTime(hub.idle_us, hub.host_us), "after the hub's block")),
+            ("write", (*write_hub, *_waits(IdleTime(self.write.idle_us, self.write.host_us), "after the write"))),
+        )
+        for kind, part in parts:
+            if any(group.has(kind) for group in self.network.groups):
+                yield Run(tuple(event._replace(us=self._if_any(kind, event.us)) for event in part))
 
     @cached_property
     def read(self) -> Phases:
@@ -231,6 +262,7 @@ class BroadcastCycle(CycleWithStarts):
                 BusLatency("read", group.read_bytes, read, group.name),
                 BusLatency("write", group.write_bytes, write, group.name),
             )
+            if latency.payload_bytes
         )
 
     def bias_us(self) -> Number | None:
@@ -242,10 +274,10 @@ class BroadcastCycle(CycleWithStarts):
 
     def doubts(self) -> tuple[Doubt, ...]:
         """Doubt of each input that is not known exactly."""
-        retries, nodes = self.network.profile.cycle.retries, self.network.nodes
-        query = write = retry = hub_request = ACKNOWLEDGED
+        retries, nodes = self.network.profile.cycle.retries, self._broadcasts
+        query = retry = hub_request = ACKNOWLEDGED
         broadcast = start = UNACKNOWLEDGED
-        hub = hub_request + CONCATENATED
+        hub, write = self._if_any("read", hub_request + CONCATENATED), self._if_any("write", ACKNOWLEDGED)
         hop_delays = query + broadcast * nodes + hub + write + retry * retries + start * self.number_of_starts
         return doubts.of_inputs(
             residual_us=self.halves * doubts.residual().uncertainty_us,
@@ -259,12 +291,18 @@ class BroadcastCycle(CycleWithStarts):
     @step("halves")
     def halves(self) -> Number:
         """Packets of the cycle: the query, each broadcast, two of the hub, the write, and retries [1]."""
-        return self.network.nodes + 4 + self.network.profile.cycle.retries
+        return self._broadcasts + self._of_host + self.network.profile.cycle.retries
+
+    @property
+    def _of_host(self) -> Number:
+        """Packets of the cycle without broadcasts: the query, two of the hub, the write [1]."""
+        of_read, of_write = self._if_any("read", 2), self._if_any("write", 1)
+        return 1 + of_read + of_write
 
     @property
     def with_gap(self) -> Number:
         """Packets with the gap term of equation (4) in their arbitration [1]."""
-        return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
+        return self._of_host + self.network.profile.cycle.retries if self._is_isochronous else self.halves
 
     def _host_swing_us(self) -> Number:
         """Change of the cycle by a standard uncertainty of the host's time [us]."""
@@ -274,7 +312,9 @@ class BroadcastCycle(CycleWithStarts):
 
         def waits_us(steps: int) -> Number:
             host_us, reset_us = self.host_us + steps * step_us, self.delays.gaps.arbitration_reset_us
-            return larger(reset_us, self.late_us + host_us) + 2 * larger(reset_us, host_us)
+            after_us = larger(reset_us, host_us)
+            before_us = larger(reset_us, self.late_us + host_us)
+            return self._if_any("read", before_us + after_us) + self._if_any("write", after_us)
 
         return doubts.swing_us(waits_us)
 

@@ -14,8 +14,8 @@ from busplan.buses.ieee1394.constants import (
     c,
 )
 from busplan.buses.ieee1394.doubts import ACKNOWLEDGED, UNACKNOWLEDGED
-from busplan.buses.ieee1394.figures import LATENCY, READS, SYNC, TERMS, WRITES, Ieee1394Figures
-from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
+from busplan.buses.ieee1394.figures import JITTER, LATENCY, READS, SYNC, TERMS, WRITES, Ieee1394Figures
+from busplan.buses.ieee1394.timing import NO_PHASES, Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     GroupHops,
@@ -47,6 +47,7 @@ def _name_phases(phases: Phases, suffix: str) -> None:
 
 
 EVENTS: Final = (
+    EventKind("jitter", "host's jitter", "profile", "j", "contention"),
     EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
     EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
     _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
@@ -75,6 +76,7 @@ STRETCHES: Final = (
 PREMISES: Final = (
     Premise("", "packets and cables alone, never measured", applies=lambda cycle: not cycle.link.has_gaps),
     Premise("host.transaction_us", "an instant host", 10.0),
+    Premise("bus.sync_jitter_us", "cycles without jitter", 20.0),
     Premise("cycle.retries", "no busy retries", 1),
     Premise("bus.isochronous_us", "no isochronous traffic", 20.0, lambda cycle: cycle.network.profile.bus.cycle_master),
     Premise("bus.phy_delay_us", "PHYs of 14 ticks", 0.144),
@@ -147,9 +149,16 @@ class CycleWithStarts(BusCycle):
     def _terms_without_starts(self) -> dict[str, Number]:
         return summed(self.runs, (figure.key for figure in TERMS))
 
+    @property
+    def _late_us(self) -> Number:
+        """Latest start by the host [us]; a cycle start before it delays nothing. The paper has no term for it."""
+        jitter_us: Number = self.network.profile.bus.sync_jitter_us
+        return 0.0 if self.model == "paper" else jitter_us
+
     @cached_property
     def _without_starts_us(self) -> Number:
-        return total(self._terms_without_starts.values())
+        """Time from the host's start to the end of the cycle, without cycle starts [us]."""
+        return total(us for term, us in self._terms_without_starts.items() if term != JITTER.key)
 
     @cached_property
     def number_of_starts(self) -> Number:
@@ -158,6 +167,8 @@ class CycleWithStarts(BusCycle):
 
     def written(self) -> Iterator[BusEvent | Run]:
         """All events but the cycle starts: they go between the rounds, and their number depends on these events."""
+        late = "latest start by the host"
+        yield BusEvent("jitter", JITTER.key, self._late_us, late, rests_on="bus.sync_jitter_us")
         yield from self.schedule()
         retries: Number = self.network.profile.cycle.retries
         if self.model != "paper" and not is_off(retries):
@@ -195,7 +206,7 @@ class CycleWithStarts(BusCycle):
 
     @property
     def required_time_slice_us(self) -> Number:
-        """Time slice that a node needs, equation (2), with cycle starts and retries, which the paper has not [us]."""
+        """Time slice that a node needs, equation (2), with jitter, cycle starts and retries beside it [us]."""
         terms, nodes = self.by_term, self.network.nodes
         slice_us = required_time_slice_us(
             self.reads_us,
@@ -204,7 +215,7 @@ class CycleWithStarts(BusCycle):
             sync_us=terms[SYNC.key],
             nodes=nodes,
         )
-        added = [us for us in (terms["cycle_starts_us"], terms["retries_us"]) if not is_off(us)]
+        added = [us for us in (terms[JITTER.key], terms["cycle_starts_us"], terms["retries_us"]) if not is_off(us)]
         return slice_us + total(added) / nodes if added else slice_us
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
@@ -214,6 +225,10 @@ class CycleWithStarts(BusCycle):
         before_us = self._without_starts_us + after_us
         more = self.starts(before_us + extra_us) - self.starts(before_us)
         return extra_us + more * self.cycle_start_us
+
+    def sync_jitter_us(self) -> Number:
+        """Half of the host's jitter: all of a cycle moves with its start [us]."""
+        return self._late_us / 2
 
     def taking_us(self, group: Group) -> float:
         """Execution time after a write [us]; 0 for a split write, which contains it."""
@@ -269,7 +284,10 @@ class CycleWithStarts(BusCycle):
         starts, start_us = int(self.number_of_starts), self.cycle_start_us
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
-        for round_ in map(tuple, super().each_round()):
+        late, *rounds = map(tuple, super().each_round())
+        if self._late_us:
+            yield late
+        for round_ in rounds:
             while sent < starts and now_us >= sent * c.CYCLE_US:
                 yield start
                 sent, now_us = sent + 1, now_us + start_us
@@ -280,7 +298,7 @@ class CycleWithStarts(BusCycle):
 
     def added_before_us(self, sent_us: float) -> float:
         """Time of the cycle starts that are due before a round [us]."""
-        due = smaller(self.starts(sent_us), self.number_of_starts)
+        due = smaller(self.starts(sent_us - self._late_us), self.number_of_starts)
         return due * self.cycle_start_us
 
 
@@ -316,7 +334,13 @@ class Ieee1394Cycle(CycleWithStarts):
     def _exchanges(self, hops: Sequence[Number]) -> tuple[Exchange, ...]:
         """Transactions of all groups, each with a node at the given hops; a derivation tells their phases apart."""
         places = range(len(self.network.groups))
-        exchanges = tuple(self._exchange(place, kind, hops[place]) for kind in TRANSACTION_KINDS for place in places)
+        groups = self.network.groups
+        exchanges = tuple(
+            self._exchange(place, kind, hops[place])
+            for kind in TRANSACTION_KINDS
+            for place in places
+            if groups[place].has(kind)
+        )
         for sent in exchanges:
             _name_phases(sent.phases, f",{sent.kind}{sent.group.name and f',{sent.group.name}'}")
         return exchanges
@@ -359,11 +383,12 @@ class Ieee1394Cycle(CycleWithStarts):
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The synchronous packet, then each transaction of every node."""
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
+        places = {id(group): place for place, group in enumerate(self.network.groups)}
         for kind in TRANSACTION_KINDS:
-            for place, transaction in enumerate(sent for sent in self.exchanges if sent.kind == kind):
-                yield Run(
-                    transaction.parts, transaction.group.nodes, place, partial(self._laid_out, transaction, place)
-                )
+            for transaction in self.exchanges:
+                if transaction.kind == kind:
+                    place = places[id(transaction.group)]
+                    yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
 
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
         """Events of the transaction with one node of a group; `number` counts the group's nodes from 0."""
@@ -374,7 +399,7 @@ class Ieee1394Cycle(CycleWithStarts):
     def all_us(self, kind: TransactionKind) -> Number:
         """Time of the reads or writes of all nodes, gaps included [us]."""
         sent = (exchange for exchange in self.exchanges if exchange.kind == kind)
-        return total(exchange.group.nodes * exchange.phases.transaction_us for exchange in sent)
+        return total(exchange.nodes * exchange.phases.transaction_us for exchange in sent)
 
     def bias_us(self) -> Number | None:
         """Mean time that the transactions take beyond the model [us]; None under the paper model."""
@@ -393,13 +418,16 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def longest(self, kind: TransactionKind) -> Phases:
         """The maximum of each phase over the reads or writes with the farthest node of each group [us]."""
-        columns = zip(*(sent.phases for sent in self._farthest if sent.kind == kind), strict=True)
+        sent = [(sent.group, sent.phases) for sent in self._farthest if sent.kind == kind]
+        if not sent:
+            return NO_PHASES
+        columns = zip(*([group.if_any(kind, us) for us in phases] for group, phases in sent), strict=True)
         return Phases(*(reduce(larger, column) for column in columns))
 
     def published_nodes(self) -> Number | None:
         """Number of nodes by equation (11) [1]; None where nodes differ."""
         network = self.network
-        if not network.is_uniform:
+        if not network.is_uniform or not all(map(network.groups[0].has, TRANSACTION_KINDS)):
             return None
         read, write = self.longest("read"), self.longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
@@ -413,7 +441,9 @@ class Ieee1394Cycle(CycleWithStarts):
     def latencies(self) -> tuple[BusLatency, ...]:
         """Latencies of a read and of a write, with the farthest node of each group."""
         latencies, all_us = [], {"read": self.reads_us, "write": self.writes_us}
-        for place, kind in product(range(len(self.network.groups)), TRANSACTION_KINDS):
+        for (place, group), kind in product(enumerate(self.network.groups), TRANSACTION_KINDS):
+            if not group.has(kind):
+                continue
             sent = self._exchange(place, kind, self._hops[place].last)
             link = sent.delays.link
             phases = {"hops": link.hops, "gap_count": link.gap_count, **sent.phases._asdict(), "all_us": all_us[kind]}

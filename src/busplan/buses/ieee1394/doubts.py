@@ -117,7 +117,7 @@ def of_cycle(
     link, spread_us = delays.link, residual().uncertainty_us
     # A wrong reading errs by the same share everywhere, so signs count.
     of_split_us = total(halves * _split_gap_term_us(node, link.gap_count) for node, halves in split)
-    of_packets = total(exchange.group.nodes * _hop_delays(exchange) for exchange in exchanges)
+    of_packets = total(exchange.nodes * _hop_delays(exchange) for exchange in exchanges)
 
     def busy_swing_us(exchange: Exchange, execution_doubt_us: Number, host_doubt_us: Number) -> Number:
         """Change of a transaction by a standard uncertainty of its execution time or of the host's time [us]."""
@@ -146,13 +146,13 @@ def of_cycle(
             "execution time",
             # Times of several groups are measured, or guessed, in the same way: they are taken to err together.
             total(
-                exchange.group.nodes * busy_swing_us(exchange, exchange.execution_uncertainty_us, 0.0)
+                exchange.nodes * busy_swing_us(exchange, exchange.execution_uncertainty_us, 0.0)
                 for exchange in exchanges
             ),
         ),
         phy_delays=of_packets + hop_delays * link.hops,
         link=link,
-        host_us=total(exchange.group.nodes * busy_swing_us(exchange, 0.0, host_doubt_us) for exchange in exchanges),
+        host_us=total(exchange.nodes * busy_swing_us(exchange, 0.0, host_doubt_us) for exchange in exchanges),
     )
 
 
@@ -207,7 +207,7 @@ def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ..
     counts: dict[int, tuple[Any, list[Number]]] = {}
     for exchange in exchanges:
         if exchange.responder.answer == "split":
-            counts.setdefault(id(exchange.group.node), (exchange.group.node, []))[1].append(2 * exchange.group.nodes)
+            counts.setdefault(id(exchange.group.node), (exchange.group.node, []))[1].append(2 * exchange.nodes)
     return tuple((node, named(total(halves), "split_halves", "halves")) for node, halves in counts.values())
 
 
@@ -215,7 +215,7 @@ def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ..
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
     """Halves of all other transactions in the cycle, and retries [1]."""
     unsplit = [exchange for exchange in exchanges if exchange.responder.answer != "split"]
-    halves = total(exchange.group.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
+    halves = total(exchange.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
     return halves + network.profile.cycle.retries
 
 

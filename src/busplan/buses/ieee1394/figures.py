@@ -63,7 +63,18 @@ def _term(name: str, reference: str, meaning: str, ink: Ink, letter: str, waits_
 
 
 _STARTS: Final = "cycle start packets, and the isochronous traffic after them"
+JITTER: Final = Figure(
+    "cycle_jitter_us",
+    "J",
+    "profile",
+    "how late the host may start a cycle",
+    "host's jitter",
+    ink="contention",
+    letter="J",
+    waits_for="host",
+)
 TERMS: Final = (
+    JITTER,
     Figure("cycle_starts_us", "cycle starts", "cycle", _STARTS, "cycle starts", ink="sync", letter="C"),
     SYNC,
     _term("arbitration", by(eq.arbitration_phase_us), "all arbitration of a cycle", "contention", "A"),
@@ -258,6 +269,7 @@ class Ieee1394Figures(OwnFigures):
     reads_us: float
     writes_us: float
     nodes_eq11: float | None
+    cycle_jitter_us: float
     cycle_starts_us: float
     sync_us: float
     cycle_arbitration_us: float

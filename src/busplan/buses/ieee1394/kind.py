@@ -154,6 +154,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         "cycle.schedule": Key(meaning="if the firmware of all nodes can"),
         "cycle.sync.ping_us": Key("ping", "PING_US"),
         "cycle.sync.ping_per_node_us": Key("ping_node", "PING_PER_NODE_US"),
+        "bus.sync_jitter_us": Key("J", role="wake-up"),
         "host.transaction_us": Key("T_host", role="host"),
         "payload.overhead_bytes": Key("overhead", "PACKET_OVERHEAD_BYTES"),
         "node.read_response": Key(meaning="if the nodes can"),
@@ -166,6 +167,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
         {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
         {"host.transaction_us": 0.0},
+        {"bus.sync_jitter_us": 0.0},
         {"cycle.retries": 0},
     )
     modules = ("evidence",)
@@ -186,6 +188,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         paper_has_not = {
             "bus.speed": not has_gaps(network),
             "bus.cycle_master": profile.bus.cycle_master and "cycle_master" in profile.bus.model_fields_set,
+            "bus.sync_jitter_us": profile.bus.sync_jitter_us,
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
             "bus.charge_hops": profile.bus.charge_hops != "farthest",
             "cycle.schedule": profile.cycle.schedule != "individual",
@@ -217,7 +220,7 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
         return (_gap_count(network), _responses(network), schedule)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """Perturbations of the margin: one more hop, one more busy retry, a slower host."""
+        """Perturbations of the margin: one more hop, one more busy retry, a slower host, a later wake-up."""
         profile = network.profile
         is_chain = profile.bus.max_hops is None
         return (
@@ -231,6 +234,10 @@ time_us = [36.8, 36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7, 833.7]
                 f"host time +{_HOST_STEP_US:g} us",
                 {"host.transaction_us": profile.host.transaction_us + _HOST_STEP_US},
                 if_nothing="the gaps after the transactions hide it",
+            ),
+            Perturbation(
+                f"host's jitter +{_HOST_STEP_US:g} us",
+                {"bus.sync_jitter_us": profile.bus.sync_jitter_us + _HOST_STEP_US},
             ),
         )
 

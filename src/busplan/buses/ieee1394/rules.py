@@ -18,7 +18,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.figures import Ieee1394Figures
 from busplan.buses.ieee1394.transactions import gap_count_of, has_gaps, hops_of, is_broadcast, safe_gap_count_of
-from busplan.buses.limits import ExactLimit, NothingUnknown, nodes_limit
+from busplan.buses.limits import ExactLimit, NothingUnknown, WakeUp, nodes_limit
 from busplan.buses.network import Network
 from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules
 from busplan.elementwise import Number
@@ -118,6 +118,7 @@ LIMITS: Final = (
         way_out="reduce bus.isochronous_us, or stop the cycle master",
     ),
     UnknownArbitration(),
+    WakeUp("bus.sync_jitter_us"),
     # The safe gap count is the value and that in force the bound: a smaller one than the safe one is unsafe.
     ExactLimit(
         "gap table",

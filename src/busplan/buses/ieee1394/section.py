@@ -11,7 +11,7 @@ from busplan.buses.ieee1394.constants import (
     c,
 )
 from busplan.elementwise import Number, choose
-from busplan.sections.base import GROUPS, MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, groups_field, refused
 from busplan.sections.cycle import (
     BusSection,
     CycleSection,
@@ -85,6 +85,18 @@ class Ieee1394Bus(BusSection):
         default=0.0,
         description="Isochronous traffic after each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
         examples=[20],
+    )
+    sync_jitter_us: TimeUs = Field(
+        default=0.0,
+        description="Latest start of a cycle by the host; the cycle ends before the next one. Cycle starts are the "
+        "bus's own and stay punctual [us]",
+        examples=[50],
+    )
+    sync_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
     )
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
         default=None,
@@ -252,7 +264,7 @@ class Ieee1394Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     node: Ieee1394Node | None = Field(default=None, description="One distributed node, where nodes are alike")
-    group: Annotated[tuple[Ieee1394Group, ...], GROUPS] = Field(
+    group: Annotated[tuple[Ieee1394Group, ...], groups_field(c.unchanged["MAX_NODES"])] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
     host: Host = Field(default_factory=Host, description="The host that sends the requests")

@@ -7,7 +7,7 @@ wire, and takes the gaps as thresholds of an idle period. Floats in, floats out;
 and the functions of `elementwise` take both.
 """
 
-from typing import Literal, NamedTuple, Self
+from typing import Final, Literal, NamedTuple, Self
 
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
@@ -243,6 +243,10 @@ class Phases(NamedTuple):
     host_us: Number
     transaction_us: Number
     """Time that the transaction takes of the cycle."""
+
+
+NO_PHASES: Final = Phases(*(0.0 for _ in Phases._fields))
+"""Phases of a direction in which no transaction goes."""
 
 
 def transaction(

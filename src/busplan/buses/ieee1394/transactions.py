@@ -130,6 +130,11 @@ class Exchange(NamedTuple):
     The idle bus of the gaps is a single part here; `events` divides it.
     """
 
+    @property
+    def nodes(self) -> Number:
+        """Nodes of the group with which it is made: none where there is no data [1]."""
+        return self.group.nodes_with(self.kind)
+
 
 def exchange(
     network: Network, group: Group, kind: TransactionKind, *, model: TimingModelName, delays: Delays
@@ -137,7 +142,7 @@ def exchange(
     """The transaction `kind` of a group, taken apart into its phases."""
     is_read, node = kind == "read", group.node
     answer: Answer = node.read_response if is_read else node.write_response
-    payload_bytes = group.read_bytes if is_read else group.write_bytes
+    payload_bytes = group.bytes_of(kind)
     responder = Responder(
         execution_us=group.read_execution_us if is_read else group.write_execution_us,
         answer=answer,

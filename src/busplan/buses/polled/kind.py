@@ -1,9 +1,9 @@
 """Polled buses as a kind of bus."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import reduce
 from itertools import chain
-from typing import ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.limits import (
@@ -16,11 +16,19 @@ from busplan.buses.limits import (
     Setting,
     Starter,
     TimingModel,
+    Value,
+    WakeUp,
 )
 from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
-from busplan.buses.polled.protocols import c, protocol_of
+from busplan.buses.polled.protocols import FASTEST_FIRST, NO_ADAPTER, adapter_of, c, protocol_of
 from busplan.elementwise import Number, larger
+
+if TYPE_CHECKING:
+    from busplan.buses.polled.section import PolledBus
+
+_LONGER_TIMER_US: Final = 1000.0
+"""Step of the adapter's timer in sensitivities [us]."""
 
 
 def _largest_bytes(network: Network) -> Number:
@@ -57,6 +65,7 @@ LIMITS: Final = (
         lambda network: protocol_of(network.profile.bus).max_bit_rate_kbit_s,
         way_out="use a lower bit rate",
     ),
+    WakeUp("bus.master_jitter_us"),
 )
 
 
@@ -65,6 +74,19 @@ _SECTIONS: Final = {
     for table, words in c.beside.items()
 }
 """Section [bus] of a new profile, by the name of its variant in `init`."""
+
+
+def _longer_timer(bus: "PolledBus") -> Perturbation:
+    """The adapter's timer 1 ms longer; for an adapter by its name, that with the next longer timer."""
+    if bus.adapter is not None and not isinstance(bus.adapter, str):
+        longer_us = bus.adapter.timer_us + _LONGER_TIMER_US
+        return Perturbation(f"timer of the adapter +{_LONGER_TIMER_US:g} us", {"bus.adapter.timer_us": longer_us})
+    timers, now_us = c.by_key("ADAPTER_TIMER_US"), adapter_of(bus).timer_us
+    longer = sorted((timer_us, name) for name, timer_us in timers.items() if timer_us > now_us)
+    if not longer:
+        return Perturbation("a longer timer of the adapter", {}, why_not="no usual adapter has one")
+    timer_us, name = longer[0]
+    return Perturbation(f"timer of the adapter {timer_us:g} us", {"bus.adapter": name})
 
 
 class Polled(Bus):
@@ -82,6 +104,9 @@ class Polled(Bus):
     starter = Starter(
         _SECTIONS["profibus"],
         variants=_SECTIONS,
+        tables={table.lower(): words["execution"] for table, words in c.beside.items() if "execution" in words},
+        servos={table.lower(): words["nodes"] for table, words in c.beside.items() if "nodes" in words},
+        bases_us={table.lower(): words["base_us"] for table, words in c.beside.items() if "base_us" in words},
         period="10ms",
         measure="from the end of a request to the answer, less bus.return_delay_us",
         base="time of a node before it answers",
@@ -94,14 +119,26 @@ class Polled(Bus):
         "bus.protocol": Key(chooses=True),
         "bus.nodes": Key(meaning="move the other nodes to a second bus"),
         "bus.bit_rate_kbit_s": Key("f", meaning="in every node"),
-        "bus.requests": Key(chooses=True, meaning="if the host's software can"),
+        "bus.requests": Key(chooses=True, meaning="if the host's software and the nodes can"),
         "bus.return_delay_us": Key("t_delay", meaning="in every node"),
         "bus.clock_tolerance": Key("df"),
-        "bus.adapter_us": Key("t_adapter", grade="assumed"),
+        "bus.adapter": Key(grade="assumed"),
+        "bus.adapter.timer_us": Key("T_L", grade="assumed"),
+        "bus.adapter.packet_bytes": Key("P", default="ADAPTER_PACKET_BYTES[ftdi]"),
+        "bus.adapter.frame_us": Key("t_frame", default="ADAPTER_FRAME_US[ftdi]"),
         "bus.host_us": Key("t_host", role="host"),
+        "bus.master_jitter_us": Key("J", role="wake-up"),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
-    evidence_data = ("polled",)
+    term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
+        {"bus.adapter": NO_ADAPTER},
+        {"bus.master_jitter_us": 0.0},
+    )
+    evidence_data = ("polled", "mesa")
+
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """The time of the reads, or the writes, of a cycle."""
+        return {"part_us": PolledCycle.part_us}
 
     def title_of(self, network: Network) -> str:
         """Name of the protocol; for a protocol of the user's own, the name of the kind."""
@@ -128,7 +165,8 @@ class Polled(Bus):
         higher = tuple(
             {"bus.bit_rate_kbit_s": float(rate)} for rate in protocol.rates["kbit_s"] if rate > bus.bit_rate_kbit_s
         )
-        faster = tuple({"bus.requests": other} for other in protocol.requests[: protocol.requests.index(way)][::-1])
+        ways = [other for other in FASTEST_FIRST if other in protocol.requests]
+        faster = tuple({"bus.requests": other} for other in ways[: ways.index(way)][::-1])
         return (
             Setting("return_delay", "return delay", Cost.REGISTER, ("bus.return_delay_us",), no_delay),
             Setting("bit_rate", "bit rate", Cost.REGISTER, ("bus.bit_rate_kbit_s",), higher),
@@ -136,11 +174,12 @@ class Polled(Bus):
         )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """Perturbations: a slower adapter, and one more repeated request."""
+        """Perturbations: a longer timer of the adapter, a later wake-up, and one more repeated request."""
         bus = network.profile.bus
         no_timeout = "" if protocol_of(bus).has_token or bus.timeout_us is not None else "bus.timeout_us is not given"
         return (
-            Perturbation("adapter +100 us", {"bus.adapter_us": bus.adapter_us + 100}),
+            _longer_timer(bus),
+            Perturbation("master's jitter +10 us", {"bus.master_jitter_us": bus.master_jitter_us + 10}),
             Perturbation("one more retry", {"bus.retries": bus.retries + 1}, why_not=no_timeout),
         )
 
@@ -152,8 +191,13 @@ class Polled(Bus):
         """Words for the protocol, the bit rate, and the way that nodes are asked."""
         bus, way = network.profile.bus, PolledCycle(network, STANDARD).way
         name = bus.protocol if isinstance(bus.protocol, str) else "a protocol of its own"
-        asked = {"exchange": "an exchange with each node", "sync": "sync requests", "single": "single requests"}[way]
-        adapter = (f"adapter {bus.adapter_us:g} us per request",) if bus.adapter_us else ()
+        asked = {"exchange": "an exchange with each node", "fast-sync": "fast sync requests"}.get(
+            way, f"{way} requests"
+        )
+        words = f"adapter {bus.adapter}" if bus.adapter != NO_ADAPTER else "no adapter"
+        if bus.adapter is not None and not isinstance(bus.adapter, str):
+            words = f"adapter with a timer of {bus.adapter.timer_us:g} us"
+        adapter = () if bus.adapter is None else (words,)
         return (name, f"{bus.bit_rate_kbit_s:g} kbit/s", asked, *adapter)
 
 

@@ -1,17 +1,28 @@
 """Protocols of polled buses: sizes of telegrams without data, and times between telegrams."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, from_table, is_everywhere, is_off, larger, rounded_up, total
+from busplan.elementwise import (
+    Number,
+    choose,
+    from_table,
+    is_everywhere,
+    is_off,
+    larger,
+    rounded_down,
+    rounded_up,
+    smaller,
+    total,
+)
 from busplan.sourced import Constants, cached
 
 c: Final = Constants(
     "busplan.buses.polled",
     beside=(
-        *("name", "called", "rates", "start", "evidence"),
+        *("name", "called", "rates", "start", "execution", "evidence", "nodes", "base_us"),
         *("is_buffered", "is_stuffed", "has_token", "has_arbiter"),
     ),
 )
@@ -24,7 +35,10 @@ UNLIMITED: Final = 1_000_000
 """Number of nodes, and data bytes of a telegram, of a protocol that limits neither."""
 UNLIMITED_KBIT_S: Final = 1e9
 
-Requests = Literal["exchange", "sync", "single"]
+Requests = Literal["exchange", "fast-sync", "sync", "single"]
+FASTEST_FIRST: Final[tuple[Requests, ...]] = get_args(Requests)
+TOGETHER: Final[tuple[Requests, ...]] = ("fast-sync", "sync")
+"""Ways in which one request reads all nodes of a group."""
 
 
 class ProtocolFigures(NamedTuple):
@@ -42,6 +56,8 @@ class ProtocolFigures(NamedTuple):
     sync_read_bytes: Number = 0
     sync_write_bytes: Number = 0
     sync_node_bytes: Number = 0
+    fast_answer_bytes: Number = 0
+    fast_node_bytes: Number = 0
     global_bytes: Number = 0
     silence_bits: Number = 0.0
     silence_us: Number = 0.0
@@ -69,10 +85,11 @@ class ProtocolFigures(NamedTuple):
 
     @property
     def requests(self) -> tuple[Requests, ...]:
-        """Ways in which nodes can be asked, the fastest first."""
+        """Ways in which nodes can be asked, the default first."""
         ways: dict[Requests, Number] = {
             "exchange": self.exchange_request_bytes,
             "sync": self.sync_read_bytes,
+            "fast-sync": smaller(self.sync_read_bytes, self.fast_answer_bytes),
             "single": self.read_request_bytes,
         }
         return tuple(way for way, size in ways.items() if not is_everywhere(size <= 0))
@@ -87,6 +104,10 @@ class ProtocolFigures(NamedTuple):
         """Data of the largest telegram when `requests` share `size` bytes [bytes]."""
         return rounded_up(size / (self.word_bytes * requests)) * self.word_bytes
 
+    def least_data_bytes(self, size: Number, requests: Number) -> Number:
+        """Data of the smallest telegram when `requests` share `size` bytes [bytes]."""
+        return rounded_down(rounded_up(size / self.word_bytes) / requests) * self.word_bytes
+
 
 @cached(maxsize=16)
 def _shipped(name: str) -> ProtocolFigures:
@@ -100,6 +121,48 @@ def _shipped(name: str) -> ProtocolFigures:
 def protocol_of(bus: Any) -> ProtocolFigures:
     """Protocol of a section [bus]."""
     return _shipped(bus.protocol) if isinstance(bus.protocol, str) else ProtocolFigures(**vars(bus.protocol))
+
+
+ADAPTERS: Final = tuple(c.by_key("ADAPTER_TIMER_US"))
+"""Names of the usual adapters of a host."""
+NO_ADAPTER: Final = "none"
+
+
+class AdapterFigures(NamedTuple):
+    """An adapter between the host and the bus; floats, arrays or traced numbers."""
+
+    timer_us: Number = 0.0
+    """Time from the last packet to the host until bytes go that do not fill one."""
+    packet_bytes: Number = 1
+    """Data of a packet, which goes at once when it is full."""
+    frame_us: Number = 0.0
+    """USB frame: the longest time that a packet waits for the host."""
+
+    @property
+    def is_off(self) -> bool:
+        """Whether there is no adapter, or one that takes no time."""
+        return is_off(self.timer_us) and is_off(self.frame_us)
+
+    def least_wait_us(self, exchange_us: Number, answers_bytes: Iterable[Number]) -> Number:
+        """Least time from the end of an exchange to its last packet, behind another exchange [us].
+
+        The timer runs from the last packet of the exchange before; a last packet that is full does not wait for it.
+        `answers_bytes` are the sizes of all answers together, of each exchange that may be this one.
+        """
+        wait_us = larger(self.timer_us - exchange_us, 0.0)
+        for size in answers_bytes:
+            packets = size / self.packet_bytes
+            wait_us = choose(rounded_down(packets) >= packets, 0.0, wait_us)
+        return wait_us
+
+
+def adapter_of(bus: Any) -> AdapterFigures:
+    """Adapter of a section [bus]; none where it has none."""
+    if bus.adapter is None or bus.adapter == NO_ADAPTER:
+        return AdapterFigures()
+    if isinstance(bus.adapter, str):
+        return AdapterFigures(*(c[f"ADAPTER_{key.upper()}[{bus.adapter}]"] for key in AdapterFigures._fields))
+    return AdapterFigures(**vars(bus.adapter))
 
 
 class Times(NamedTuple):

@@ -5,18 +5,26 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from busplan.buses.polled.protocols import PROTOCOLS, UNLIMITED, UNLIMITED_KBIT_S, Requests, c, protocol_of
+from busplan.buses.polled.protocols import ADAPTERS, PROTOCOLS, UNLIMITED, UNLIMITED_KBIT_S, Requests, c, protocol_of
+from busplan.elementwise import Number
 from busplan.english import listed
 from busplan.sections.base import Bytes, Count, Problem, Section, TimeUs
-from busplan.sections.cycle import BusSection
+from busplan.sections.cycle import BusSection, time_uncertainty_us
 from busplan.sections.profile import Profile
 
 BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 Tolerance = Annotated[float, Field(ge=0, le=0.05, allow_inf_nan=False)]
 if TYPE_CHECKING:
     ProtocolName = str
+    AdapterName = str
 else:
     ProtocolName = Literal[tuple(PROTOCOLS)]
+    AdapterName = Literal[ADAPTERS]
+
+
+def _table_or_name(value: object) -> str:
+    """Tag of a key that is a name or a table."""
+    return "(a table)" if isinstance(value, dict | Section) else "(a name)"
 
 
 class Protocol(Section):
@@ -43,6 +51,15 @@ class Protocol(Section):
     sync_read_bytes: Bytes = Field(default=0, description="Request that reads many nodes [bytes]", examples=[8])
     sync_write_bytes: Bytes = Field(default=0, description="Request that writes many nodes [bytes]", examples=[8])
     sync_node_bytes: Bytes = Field(default=0, description="Each node's part of these requests [bytes]", examples=[1])
+    fast_answer_bytes: Bytes = Field(
+        default=0,
+        description="One answer of all nodes to a request that reads many, without their parts; 0 where each answers "
+        "by itself [bytes]",
+        examples=[8],
+    )
+    fast_node_bytes: Bytes = Field(
+        default=0, description="Each node's part of this answer, without its data [bytes]", examples=[4]
+    )
     global_bytes: Bytes = Field(
         default=0, description="Broadcast that may open a cycle, such as Global Control [bytes]", examples=[13]
     )
@@ -70,13 +87,36 @@ class Protocol(Section):
     )
 
 
+class Adapter(Section):
+    """Section [bus.adapter]: an adapter that gathers bytes for the host and sends them in packets, as USB serial ones.
+
+    Bytes go when a packet is full, and when a timer ends that runs from the last packet.
+    """
+
+    timer_us: TimeUs = Field(
+        description="Latency timer; 0 where the adapter sends each answer at once, as with an event character [us]",
+        examples=[1000],
+    )
+    packet_bytes: Count = Field(
+        default_factory=lambda: int(c["ADAPTER_PACKET_BYTES[ftdi]"]),
+        description="Data of a full packet [bytes]",
+        examples=[62],
+    )
+    frame_us: TimeUs = Field(
+        default_factory=lambda: float(c["ADAPTER_FRAME_US[ftdi]"]),
+        description="USB frame, the longest time that a packet waits for the host: 1000 at full speed, 125 at high "
+        "speed [us]",
+        examples=[125],
+    )
+
+
 class PolledBus(BusSection):
     """Section [bus]: a serial bus whose master asks its nodes one by one."""
 
     kind: Literal["polled"] = Field(description="Kind of bus", examples=["polled"])
     protocol: Annotated[
         Annotated[ProtocolName, Tag("(a name)")] | Annotated[Protocol, Tag("(a table)")],
-        Discriminator(lambda value: "(a table)" if isinstance(value, dict | Protocol) else "(a name)"),
+        Discriminator(_table_or_name),
     ] = Field(
         description=f"Protocol: {listed(tuple(PROTOCOLS), 'or')}, or a table [bus.protocol] of your own",
         examples=["dynamixel-2"],
@@ -88,7 +128,8 @@ class PolledBus(BusSection):
     requests: Requests | None = Field(
         default=None,
         description="Way to ask the nodes; exchange: both ways in one request; sync: all nodes of a group in one; "
-        "single: one node one way; without it the first of these that the protocol has",
+        "fast-sync: the same with one answer of all; single: one node one way; without it the first of exchange, sync "
+        "and single that the protocol has",
         examples=["sync"],
     )
     reads: Annotated[int, Field(ge=1, le=1000)] = Field(
@@ -115,13 +156,38 @@ class PolledBus(BusSection):
         "cycle; 0 for exact clocks. Without it the protocol's; where that says nothing 0.005, assumed",
         examples=[0.0001],
     )
-    adapter_us: TimeUs = Field(
-        default=0.0,
-        description="Time that the host's adapter adds to each request with answers, as a USB latency timer [us]",
-        examples=[1000],
+    adapter: (
+        Annotated[
+            Annotated[AdapterName, Tag("(a name)")] | Annotated[Adapter, Tag("(a table)")],
+            Discriminator(_table_or_name),
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description=f"Adapter of the host: {listed(ADAPTERS, 'or')}, or a table [bus.adapter]; without it none",
+        examples=["ftdi-low-latency"],
     )
     host_us: TimeUs = Field(
         default=0.0, description="The host's own time in a cycle, between feedback and commands [us]", examples=[200]
+    )
+    host_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None, description="Grade of host_us", examples=["measured"]
+    )
+    host_uncertainty_us: TimeUs | None = Field(
+        default=None,
+        description="Standard uncertainty of host_us; without it 10 %, where it is assumed host_us / sqrt(3) [us]",
+        examples=[5],
+    )
+    master_jitter_us: TimeUs = Field(
+        default=0.0,
+        description="Latest start of a cycle by the master; the cycle ends before the next one [us]",
+        examples=[50],
+    )
+    master_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
     )
     global_control: bool = Field(
         default=False,
@@ -136,6 +202,13 @@ class PolledBus(BusSection):
         description="Time that the master waits for an answer that does not come; of PROFIBUS without it T_SL [us]",
         examples=[2000],
     )
+
+    @property
+    def host_doubt_us(self) -> Number:
+        """Standard uncertainty of the host's own time [us]."""
+        if self.host_uncertainty_us is not None:
+            return self.host_uncertainty_us
+        return time_uncertainty_us(self.host_us, is_guess=self.host_grade == "assumed")
 
     def _problems(self) -> Iterator[Problem]:
         protocol = protocol_of(self)

@@ -204,7 +204,7 @@ class Sercos2Cycle(SercosCycle):
         """Time by which feedback must be ready [us]: 0, the start of MST."""
         return 0.0
 
-    def latencies(self) -> tuple[BusLatency, ...]:
+    def both_delays(self) -> tuple[BusLatency, BusLatency]:
         """Age of feedback when the host has it, and delay of a command up to its effect."""
         sent = self.by_term
         before_us = sent["cycle_mst_us"] + self.start_us

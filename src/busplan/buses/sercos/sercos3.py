@@ -9,7 +9,7 @@ from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
 from busplan.buses.limits import Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos.shared import DELAYS, word_bytes
-from busplan.elementwise import Number, choose, larger, named, rounded_down, rounded_up, smaller, step
+from busplan.elementwise import Number, choose, is_everywhere, larger, named, rounded_down, rounded_up, smaller, step
 from busplan.sections.base import TransactionKind
 from busplan.sourced import Constants
 
@@ -256,7 +256,6 @@ class Telegrams(NamedTuple):
 def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
     """Telegrams that carry a payload of each node: MDT for "write", AT for "read"."""
     is_in_all = network.profile.bus.hot_plug_field == "all"
-    sizes = (group.write_bytes if kind == "write" else group.read_bytes for group in network.groups)
     first_bytes: Number = c.HOT_PLUG_BYTES
     if kind == "write":
         first_bytes = first_bytes + c.EXTENDED_BYTES + (c.ALIGNED_BYTES if is_in_all else 0)
@@ -266,7 +265,11 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
         (
             Items(network.nodes, c.CHANNEL_BYTES),
             Items(network.nodes, c.DEVICE_BYTES),
-            *(Items(group.nodes, data_bytes(network, size)) for group, size in zip(network.groups, sizes, strict=True)),
+            *(
+                Items(group.nodes_with(kind), data_bytes(network, group.bytes_of(kind)))
+                for group in network.groups
+                if group.has(kind)
+            ),
         ),
         SORTS[kind].upper(),
     )
@@ -274,5 +277,6 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
 
 def data_bytes(network: Network, payload_bytes: Number) -> Number:
     """Cyclic data of a device in whole words, from V1.1 on with the control of its connection [bytes]."""
-    words: Number = word_bytes(payload_bytes)
+    # Where nobody has data there are no pieces; their size still divides the room.
+    words: Number = word_bytes(payload_bytes if is_everywhere(payload_bytes > 0) else larger(payload_bytes, 1))
     return words if network.profile.bus.version == "V1.0" else words + c.CONNECTION_BYTES

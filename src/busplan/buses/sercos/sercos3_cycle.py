@@ -174,13 +174,11 @@ class Sercos3Cycle(SercosCycle):
         count = total(filling.telegrams for filling in self.fillings.values())
         gap_us: Number = bus.gap_bytes * c.BYTE_US * (count + (jitters + rings) / 2)
         delays_us: Number = 2 * rings * self.network.nodes * bus.device_delay_us
+        is_published: bool = bus.master_jitter_cycles is None
+        jitter_us: Number = jitters / 2 * bus.master_jitter_us * c.MASTER_JITTER_SHARE if is_published else 0.0
         return (
             Doubt("bus.gap_bytes", "gap between telegrams", gap_us * c.GAP_SHARE),
-            Doubt(
-                "bus.master_jitter_us",
-                "jitter of the master",
-                jitters / 2 * bus.master_jitter_us * c.MASTER_JITTER_SHARE,
-            ),
+            Doubt("bus.master_jitter_us", "jitter of the master", jitter_us),
             Doubt("bus.device_delay_us", "delay of the devices", delays_us * c.DEVICE_DELAY_SHARE),
         )
 
@@ -210,7 +208,7 @@ class Sercos3Cycle(SercosCycle):
         at_start_us = self.network.profile.bus.at_start_us
         return self._start_us() + (start_us if at_start_us is None else larger(start_us, at_start_us))
 
-    def latencies(self) -> tuple[BusLatency, ...]:
+    def both_delays(self) -> tuple[BusLatency, BusLatency]:
         """Age of feedback when the host has it, and delay of a command up to its effect."""
         return delays(
             self.network,

@@ -13,6 +13,7 @@ from busplan.buses.limits import (
     Perturbation,
     Setting,
     TimingModel,
+    WakeUp,
     nodes_limit,
     period_limit,
 )
@@ -30,6 +31,7 @@ from busplan.buses.sercos.shared import KEYS, RULES, SercosBus, starter
 from busplan.elementwise import Number, larger
 
 _METHOD: Final = "bus.timing_method"
+_JITTER_STEP_US: Final = 1.0
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
 
 
@@ -59,6 +61,7 @@ LIMITS: Final = (
         lambda _network: c.MOST_TELEGRAMS,
         way_out="use a smaller payload or a second network",
     ),
+    WakeUp("bus.master_jitter_us"),
 )
 
 
@@ -90,7 +93,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "bus.nodes": Key(meaning="move the other devices to a second network"),
         "bus.gap_bytes": Key("gap", "DEFAULT_GAP_BYTES"),
         "bus.device_delay_us": Key("t_dev", "DEVICE_DELAY_US"),
-        "bus.master_jitter_us": Key("J_master", "MASTER_JITTER_US"),
+        "bus.master_jitter_us": Key("J_master", "MASTER_JITTER_US", role="wake-up"),
         "bus.master_delay_us": Key("t_master", "MASTER_DELAY_US"),
         "bus.component_delay_us": Key("t_comp", "COMPONENT_DELAY_US"),
         "bus.at_start_us": Key("t_1,min"),
@@ -110,14 +113,16 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         return (Setting("timing_method", "timing method", Cost.SCHEDULE, (_METHOD,), values),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """Perturbations: a wider gap, and slower devices."""
+        """Perturbations: a wider gap, slower devices, and a later wake-up of the master."""
         bus = network.profile.bus
         beside = "" if bus.timing_method != "mdt-at-ucc" else "this timing method has no ring delay"
+        later = {"bus.master_jitter_us": bus.master_jitter_us + _JITTER_STEP_US}
         return (
             Perturbation("gap +1 byte", {"bus.gap_bytes": bus.gap_bytes + 1}),
             Perturbation(
                 "delay of a device +0.1 us", {"bus.device_delay_us": bus.device_delay_us + 0.1}, if_nothing=beside
             ),
+            Perturbation(f"master's jitter +{_JITTER_STEP_US:g} us", later),
         )
 
     def payloads(self, network: Network) -> PayloadRange:

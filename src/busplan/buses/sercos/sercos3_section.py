@@ -49,6 +49,12 @@ class Sercos3Bus(BusSection):
         description="Jitter with which the master sends; CoSeMa demands an eighth of the period at most [us]",
         examples=[0.1],
     )
+    master_jitter_cycles: Count | None = Field(
+        default=None,
+        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
+    )
     master_delay_us: TimeUs = Field(
         default_factory=lambda: float(c.MASTER_DELAY_US),
         description="From the start of a cycle in the master to the end of the first header [us]",
@@ -67,8 +73,8 @@ class Sercos3Bus(BusSection):
     )
     ring_grade: Literal["measured", "published", "assumed"] | None = Field(
         default=None,
-        description='Grade of device_delay_us, master_jitter_us and gap_bytes; unless "measured", the '
-        "published ranges are their doubt",
+        description="Grade of device_delay_us, gap_bytes, and master_jitter_us without master_jitter_cycles; "
+        'unless "measured", the published ranges are their doubt',
         examples=["measured"],
     )
     pipeline_cycles: Annotated[int, Field(ge=1, le=MOST_PIPELINE)] = Field(

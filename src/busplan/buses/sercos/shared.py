@@ -13,6 +13,7 @@ from busplan.buses.limits import Key, Starter, unknown_period
 from busplan.buses.network import Network
 from busplan.buses.rule import read_rules
 from busplan.elementwise import Number, larger, rounded_up, total
+from busplan.sections.base import TRANSACTION_KINDS
 from busplan.sourced import Constants
 
 c: Final = Constants("busplan.buses.sercos", "shared.toml")
@@ -70,12 +71,14 @@ def starter(bus: str) -> Starter:
     )
 
 
-def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0) -> tuple[BusLatency, ...]:
+def delays(
+    network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0
+) -> tuple[BusLatency, BusLatency]:
     """Age of feedback when the host has it, and delay of a command up to its effect.
 
     All nodes sample at once, and take their commands over at once.
     """
-    write_us = (group.write_execution_us + group.worst_extra_us for group in network.groups)
+    write_us = (group.slowest_us("write") for group in network.groups)
     return (
         _delay("feedback", _slowest_read_us(network), *feedback_us, ring_us),
         _delay("command", reduce(larger, write_us), *command_us, ring_us),
@@ -83,7 +86,7 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
 
 
 def _slowest_read_us(network: Network) -> Number:
-    return reduce(larger, (group.read_execution_us + group.worst_extra_us for group in network.groups))
+    return reduce(larger, (group.slowest_us("read") for group in network.groups))
 
 
 def _delay(name: str, *parts_us: Number) -> BusLatency:
@@ -95,6 +98,15 @@ def _delay(name: str, *parts_us: Number) -> BusLatency:
 class SercosCycle(BusCycle):
     """A cycle of SERCOS I, II or III."""
 
+    @abstractmethod
+    def both_delays(self) -> tuple[BusLatency, BusLatency]:
+        """Age of feedback when the host has it, and delay of a command up to its effect."""
+
+    def latencies(self) -> tuple[BusLatency, ...]:
+        """Age of feedback and delay of commands, as far as nodes have them."""
+        groups, both = self.network.groups, zip(TRANSACTION_KINDS, self.both_delays(), strict=True)
+        return tuple(latency for kind, latency in both if any(group.has(kind) for group in groups))
+
     @property
     @abstractmethod
     def feedback_due_us(self) -> Number:
@@ -102,7 +114,7 @@ class SercosCycle(BusCycle):
 
     def arrival_us(self, node: int) -> float:  # noqa: ARG002 - all at once
         """Time at which the last byte of the MDT has passed the ring, so that all nodes have their commands [us]."""
-        _, command = self.latencies()
+        _, command = self.both_delays()
         return command.phases["delay_us"] - command.phases["node_us"]
 
     def sampled_us(self) -> float:
@@ -114,7 +126,7 @@ class SercosCycle(BusCycle):
         pipeline = int(self.network.profile.bus.pipeline_cycles)
         if not at_sync:
             return pipeline
-        _, command = self.latencies()
+        _, command = self.both_delays()
         late_us = command.phases["delay_us"] - self.sampled_us()
         return pipeline + ceil(late_us / self.network.period_us)
 

@@ -129,6 +129,9 @@ def time_lines(figures: CycleFigures, profile: Profile) -> Iterator[tuple[str, b
     used, whole = used_us(figures), known_text(given_us, None)
     whole = whole if profile.cycle.slice_ratio == 1 else f"the {whole} that the bus may use"
     words = f"{known_text(used, uncertainty_us)} us of {whole}, {100 * used / given_us:.0f} %"
+    possible_us = figures.required_us - (figures.least_required_us or 0.0)
+    if possible_us > 0:
+        words = f"at least {known_text(used - possible_us, uncertainty_us)}, at most {words}"
     yield "used", blocks.Sentence((words,))
     doubt = "" if uncertainty_us is None else f", +/- {known_text(uncertainty_us, uncertainty_us)}"
     reserve_us = given_us * profile.limits.reserve

@@ -116,12 +116,10 @@ def _state(row: Figure, values: Mapping[str, Any]) -> blocks.State:
 
 
 def _rests_on_table(verdict: Verdict) -> blocks.Table:
-    """Table of what the profile does not give and the verdict takes for granted."""
+    """Table of what the verdict takes for granted: what the profile does not give, and a measured wake-up."""
     rows = (blocks.TableRow((part.words, blocks.Code(part.key) if part.key else "none")) for part in verdict.rests_on)
     columns = blocks.TableColumn("premise", kind="words"), blocks.TableColumn("key", kind="words")
-    return blocks.Table(
-        columns, tuple(rows), blocks.Sentence(("Premises of the verdict that the profile does not give",))
-    )
+    return blocks.Table(columns, tuple(rows), blocks.Sentence(("Premises of the verdict",)))
 
 
 def _groups_table(answer: CapacityAnswer) -> blocks.Table:

@@ -1,6 +1,6 @@
 """`busplan.compare`."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, floor, log2
 from typing import Final, NamedTuple
@@ -86,6 +86,8 @@ class MachineOnKind(NamedTuple):
     """Assumptions about the host's own time, those of the profile included; a machine with any has no rank."""
     left_out: tuple[str, ...]
     """Keys and sections that the profile sets and this kind does not have."""
+    of_host: Mapping[str, str]
+    """Keys of the profile's host by their names on this kind; empty on its own."""
     execution: str
     """Meaning of the profile's execution times on another kind; empty where there is nothing to say."""
     figures: CycleFigures
@@ -275,8 +277,9 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
         tested=parts_tested(bus.evidence_for(on_kind)),
         is_own=is_own,
         assumed=assumed,
-        assumed_host=tuple(_assumed_host(on_kind, assumed, is_own=is_own)),
+        assumed_host=tuple(_assumed_host(on_kind, assumed, capacity)),
         left_out=conversion.left_out,
+        of_host=conversion.of_host,
         execution="" if is_own else _execution(on_kind, network),
         figures=capacity,
         broken_limits=words_behind(capacity, on_kind),
@@ -288,12 +291,13 @@ def _on_kind(network: Network, name: str) -> MachineOnKind | NotOnKind:
     )
 
 
-def _assumed_host(network: Network, assumed: Sequence[AssumedKey], *, is_own: bool) -> Iterator[AssumedKey]:
-    """Assumptions about the host's own time, those of the profile included."""
+def _assumed_host(network: Network, assumed: Sequence[AssumedKey], figures: CycleFigures) -> Iterator[AssumedKey]:
+    """Assumption about the host's own time, that of the profile included, where its cycle counts it."""
     key = network.bus.key_of("host")
-    if is_own and key and (host := given(network.profile, key)).grade == "assumed" and host.value:
-        yield AssumedKey(host.name, host.value, "profile")
-    yield from (assumption for assumption in assumed if assumption.key == key)
+    is_counted = any(doubt.us for doubt in figures.doubts if doubt.key == key)
+    if is_counted and (host := given(network.profile, key)).grade == "assumed":
+        of_kind = (assumption for assumption in assumed if assumption.key == key)
+        yield next(of_kind, AssumedKey(key, host.value, "profile"))
 
 
 def _execution(on_kind: Network, network: Network) -> str:

@@ -192,6 +192,9 @@ def _note(machine: MachineOnKind) -> blocks.Sentence:
     sentences = []
     if machine.execution:
         sentences.append(blocks.Sentence((machine.execution,)))
+    if machine.of_host:
+        keys = listed([f"{name} from {key}" for name, key in machine.of_host.items()], "and")
+        sentences.append(blocks.Sentence((f"The host is the machine's own: {keys}.",)))
     if machine.best is not None:
         values = " and ".join(f"{key} = {short_text(value)}" for key, value in machine.best.changes.items())
         sentences.append(blocks.Sentence((f"The smallest period is with {values}, which is free to change.",)))
@@ -259,7 +262,7 @@ def _record(machine: MachineOnKind | NotOnKind) -> blocks.Record:
                 *("smallest_period_us", "smallest_period_with", "no_period"),
             )
         )
-        lists: blocks.Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
+        lists: blocks.Record = {"assumed": [], "assumed_host": [], "of_host": {}, "left_out": [], "curve": []}
         return {**head, "why_not": list(machine.why), **empty, **lists}
     return {
         **head,
@@ -272,6 +275,7 @@ def _record(machine: MachineOnKind | NotOnKind) -> blocks.Record:
         "no_period": None if machine.smallest.us else machine.smallest.need.why,
         "assumed": [assumed._asdict() for assumed in machine.assumed],
         "assumed_host": [assumed.key for assumed in machine.assumed_host],
+        "of_host": dict(machine.of_host),
         "left_out": list(machine.left_out),
         "curve": [{"period_us": point.period_us, **_safe_record(point)} for point in machine.curve],
     }

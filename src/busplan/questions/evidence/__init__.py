@@ -28,7 +28,7 @@ from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import Section
 from busplan.sourced import Grade
 
-Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
+Unit = Literal["us", "1", "s", "1/s", "mm", "bytes", "bits"]
 
 
 class Comparison(NamedTuple):

@@ -147,11 +147,18 @@ def _at_period(network: Network, meant: Wanted, timing_models: Sequence[str] | N
         having = [model for model in models if figure.key in numbers[model].get(transaction, {})]
         for model in timing_models or having[:1]:
             traced = numbers[model][transaction]
-            for shown in (figure, *_BESIDE.get(figure.key, ())):
+            for shown in (figure, *_least(figure, network.bus, traced), *_BESIDE.get(figure.key, ())):
                 if shown.key in traced:
                     found = _derivation(network, traced[shown.key], meant.command, shown, model, transaction or None)
                     uses = traced.get(MARGIN_CORRECTED.key) if shown.key == MARGIN.key else None
                     yield found if uses is None else replace(found, corrected_us=float(value_of(uses)))
+
+
+def _least(figure: Figure, bus: Bus, traced: _Numbers) -> Iterator[Figure]:
+    """The figure of the lower end of another, where the ends differ."""
+    least = figures_of(bus)["capacity"].get(f"least_{figure.key}")
+    if least and least.key in traced and value_of(traced[least.key]) < value_of(traced[figure.key]):
+        yield least
 
 
 def _derivation(
@@ -211,13 +218,20 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
 def _numbers_of(
     network: Network, command: CommandName, model: str, figures: Mapping[str, Figure]
 ) -> dict[str, _Numbers]:
-    cycle = network.bus.cycle(network, model=model)
+    return {name: _traced(numbers, figures) for name, numbers in _of_command(network, command, model=model).items()}
+
+
+def _of_command(network: Network, command: CommandName, *, model: str) -> dict[str, dict[str, Number]]:
+    """Figures of a command that exist, by transaction and key; those of `capacity` have the transaction ""."""
+    cycle, of_all = network.bus.cycle(network, model=model), dict[str, dict[str, Number | None]]()
     if command == "capacity":
-        return {"": _traced(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), figures)}
-    nodes = network.nodes
+        of_all[""] = _of_capacity(cycle, is_decided=model == network.bus.deciding_model)
+    else:
+        for latency in cycle.latencies():
+            given = {"payload_bytes": latency.payload_bytes, "nodes": network.nodes}
+            of_all[latency.label] = {**given, **latency.phases}
     return {
-        latency.label: _traced({"payload_bytes": latency.payload_bytes, "nodes": nodes, **latency.phases}, figures)
-        for latency in cycle.latencies()
+        name: {key: number for key, number in of_each.items() if number is not None} for name, of_each in of_all.items()
     }
 
 
@@ -234,13 +248,9 @@ def _of_capacity(cycle: BusCycle, *, is_decided: bool) -> dict[str, Number | Non
     return numbers
 
 
-def _traced(numbers: Mapping[str, Number | None], figures: Mapping[str, Figure]) -> dict[str, Traced]:
-    """Numbers of the figures by key, each with its symbol, without None."""
-    return {
-        key: _named(number, key, figures[key].symbol)
-        for key, number in numbers.items()
-        if key in figures and number is not None
-    }
+def _traced(numbers: Mapping[str, Number], figures: Mapping[str, Figure]) -> dict[str, Traced]:
+    """Numbers of the figures by key, each with its symbol."""
+    return {key: _named(number, key, figures[key].symbol) for key, number in numbers.items() if key in figures}
 
 
 def _named(number: Number, key: str, symbol: str) -> Traced:
@@ -256,8 +266,10 @@ def explained_figures(network: Network) -> list[tuple[CommandName, Figure]]:
     """Figures of a network that an equation leads to, each with its command, in the order of their documents."""
     explained: list[tuple[CommandName, Figure]] = []
     for command, figures in figures_of(network.bus).items():
-        traced = [keys for model in model_names(network) for keys in numbers_of(network, command, model=model).values()]
-        explained += [(command, figure) for key, figure in figures.items() if any(key in keys for keys in traced)]
+        # The same figures exist in plain numbers, which are faster than traced ones.
+        of_models = (_of_command(network, command, model=model).values() for model in model_names(network))
+        found = {key for of_each in of_models for numbers in of_each for key in numbers}
+        explained += [(command, figure) for key, figure in figures.items() if key in found]
     return explained
 
 

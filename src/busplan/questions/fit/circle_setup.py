@@ -9,7 +9,7 @@ from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
 from busplan.elementwise import within
 from busplan.questions.fit.certainty import available_us, deciding_cycle
-from busplan.sections.base import Section, value_at
+from busplan.sections.base import TRANSACTION_KINDS, Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.parameters import (
@@ -53,7 +53,7 @@ def loop_delays_us(network: Network) -> tuple[float, float]:
     whole_us = cycle.loop_periods(at_sync=cycle.takes_at_sync) * network.profile.cycle.period_us
     if cycle.takes_at_sync:
         return whole_us, whole_us
-    since_us = whole_us - cycle.sampled_us()
+    since_us = whole_us + cycle.host_lag_us() - cycle.sampled_us()
     first_us, last_us = _command_effects_us(cycle)
     return since_us + first_us, since_us + last_us
 
@@ -79,7 +79,7 @@ def _command_effects_us(cycle: BusCycle) -> tuple[float, float]:
     """Effect of the commands of the first and the last node with axes, from the start of the cycle [us]."""
     network = cycle.network
     ends = list(accumulate(int(group.nodes) for group in network.groups))
-    with_axes = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
+    with_axes = _moved(network) or range(len(ends))
     in_every_cycle = [place for place in with_axes if not network.groups[place].is_slower] or with_axes
 
     def effect_us(place: int, node: int) -> float:
@@ -88,6 +88,12 @@ def _command_effects_us(cycle: BusCycle) -> tuple[float, float]:
 
     first, last = in_every_cycle[0], in_every_cycle[-1]
     return effect_us(first, [0, *ends][first] + 1), effect_us(last, ends[last])
+
+
+def _moved(network: Network) -> list[int]:
+    """Places of the groups whose axes can be on the circle: they get commands and, of a loop on the host, feedback."""
+    kinds = TRANSACTION_KINDS if network.profile.servo.loop == "host" else ("write",)
+    return [place for place, group in enumerate(network.groups) if group.axes and all(map(group.has, kinds))]
 
 
 AxisName = Literal["x", "y"]
@@ -101,6 +107,8 @@ def refusals(network: Network) -> tuple[Refused, ...]:
     """
     if not network.groups:
         return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
+    if any(group.axes for group in network.groups) and not _moved(network):
+        return (_no_loop(network),)
     causes = (*_slow_setpoints(network), *_long_bus_delay(network))
     fits = within(deciding_cycle(network).required_us, available_us(network))
     if not fits or network.bus.broken(network):
@@ -132,6 +140,16 @@ def _servo_refusals(network: Network, *, is_loop_refused: bool) -> tuple[Refused
         causes += _unfit_move(network, axes)
     # Both axes may refuse one key.
     return tuple({cause.name: cause for cause in reversed(causes)}.values())[::-1]
+
+
+def _no_loop(network: Network) -> Refused:
+    """Refuse a network in which no axis gets commands or, of a loop on the host, gives feedback."""
+    group = max(network.groups, key=lambda group: int(group.nodes * group.axes))
+    missing = "write" if not group.has("write") else "read"
+    why = "an axis that gets no commands moves along no circle"
+    if missing == "read":
+        why = 'a loop on the host needs feedback; close it on the node, servo.loop = "node"'
+    return Refused(group.payload_key(group.payload.key_of(missing)), 0, why)
 
 
 def _slow_setpoints(network: Network) -> Iterator[Refused]:

@@ -12,7 +12,7 @@ from busplan.buses.figure import WAITS, BusFigures, OwnFigures, Sort, Wait
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit, Safety
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, existing, larger, total, within
+from busplan.elementwise import Number, choose, existing, is_off, larger, total, within
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import (
     FITS,
@@ -142,6 +142,8 @@ class CycleFigures(FitFigures):
     uncertainty_us: float | None
     """None also where U is unknown."""
     safe_required_us: float | None
+    least_required_us: float | None
+    """`required_us` without the part that is only possible."""
     safe_min_period_us: float | None
     doubts: tuple[Doubt, ...]
     """Components of the uncertainty; empty under a timing model that does not decide."""
@@ -432,7 +434,14 @@ def _types(register: BusFigures) -> Mapping[str, type]:
     return {figure.key: TYPES[figure.sort] for figure in register.capacity if figure.sort in TYPES}
 
 
-_CERTAINTY_KEYS: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_min_period_us")
+_CERTAINTY_KEYS: Final = (
+    "bias_us",
+    "margin_corrected_us",
+    "uncertainty_us",
+    "safe_required_us",
+    "least_required_us",
+    "safe_min_period_us",
+)
 """Figures of a cycle that only the timing model that decides has."""
 
 
@@ -446,8 +455,13 @@ def certainty_numbers(certain: Certainty, cycle: BusCycle) -> dict[str, Number |
         "margin_corrected_us": certain.margin_corrected_us,
         "uncertainty_us": uncertainty_us,
         "safe_required_us": certain.safe_required_us,
+        "least_required_us": _least_us(cycle.required_us, certain.possible_us),
         "safe_min_period_us": shortest_period_us(cycle.network, certain.safe_required_us, is_shown=True),
     }
+
+
+def _least_us(required_us: Number, possible_us: Number) -> Number:
+    return required_us if is_off(possible_us) else required_us - possible_us
 
 
 def numeric_figures(cycle: BusCycle) -> dict[str, Number]:

@@ -12,7 +12,7 @@ from busplan.profile.document import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
 from busplan.questions.fit.figures import CycleFigures, FitFigures
 from busplan.questions.fit.network import at_once, bus_of, trial
-from busplan.sections.base import value_at
+from busplan.sections.base import beside, value_at
 from busplan.sections.cycle import TableExecution
 from busplan.sections.profile import Profile
 from busplan.sourced import SYMBOLS, Input, Sourced
@@ -34,7 +34,8 @@ def given(profile: Profile, key: str) -> Input:
     """Input of a derivation from a key of a profile.
 
     Its grade is the first of these: that of its sourced default, if it has that value; the key beside it, such as
-    bus.master_grade for bus.master_us; the grade of its section; its comment in the file; "given". A grade that the
+    bus.master_grade for bus.master_us; measured with the cycles of which it is the worst; the grade of its section; its
+    comment in the file; "given". A grade that the
     kind of bus sets for the key replaces all but that of a comment.
     """
     *sections, name = key.split(".")
@@ -45,9 +46,11 @@ def given(profile: Profile, key: str) -> Input:
         section = value_at(profile, ".".join(sections[:number]))
         if getattr(section, "grade", None):
             own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
-    grade_name = f"{name.removesuffix('_us')}_grade"
+    grade_name = beside(name, "grade")
     if getattr(section, grade_name, None):
         own_grade, graded_by = getattr(section, grade_name), f"; graded by {'.'.join(sections)}.{grade_name}"
+    if cycles := getattr(section, beside(name, "cycles"), None):
+        own_grade, graded_by = "measured", f"; the worst of {int(cycles):,} measured cycles"
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
@@ -61,7 +64,9 @@ def given(profile: Profile, key: str) -> Input:
     default = bus.constants.get(bus_key.default)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
-    by_comment = comment_grade(profile, key) if is_set and grade == "given" else None
+    # A worst that was measured on another machine is assumed of this one.
+    is_open = grade == "given" or cycles
+    by_comment = comment_grade(profile, key) if is_set and is_open else None
     if by_comment is not None:
         grade, source = by_comment, f"{source}; graded by its comment"
     else:

@@ -48,12 +48,27 @@ def most_and_safe_nodes(
     with_nodes: Callable[[Number], Network], network: Network, *, model: str
 ) -> tuple[MostNodes, MostNodes | None]:
     """The most nodes that fit, and that are shown to fit; None under a timing model that does not decide."""
+    with_nodes = _remembered(with_nodes)
     most = most_nodes(with_nodes, limits_with_time(network, model=model))
     if model != network.bus.deciding_model:
         return most, None
     # No more nodes are shown to fit than fit.
     ceiling = int(most.nodes.max() if hasattr(most.nodes, "max") else most.nodes) + 1
     return most, most_nodes(with_nodes, limits_to_be_safe(network), ceiling=min(ceiling, MAX_COUNT))
+
+
+def _remembered(with_nodes: Callable[[Number], Network]) -> Callable[[Number], Network]:
+    """The same network for each limit that is tried with so many nodes, so that limits share what it costs."""
+    networks: dict[int, Network] = {}
+
+    def of(nodes: Number) -> Network:
+        if not isinstance(nodes, int):
+            return with_nodes(nodes)
+        if nodes not in networks:
+            networks[nodes] = with_nodes(nodes)
+        return networks[nodes]
+
+    return of
 
 
 def most_nodes(

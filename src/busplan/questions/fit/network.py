@@ -1,12 +1,12 @@
 """A profile as a network: its kind of bus, and its nodes with their payloads and execution times."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, Traced, is_everywhere, total
+from busplan.elementwise import Number, Traced, choose, is_everywhere, total
 from busplan.profile.document import override
 from busplan.sections.base import TRANSACTION_KINDS, Section, with_all_unchecked, with_unchecked
 from busplan.sections.machine import ProfileGroup
@@ -38,7 +38,7 @@ def _group(members: Sequence[ProfileGroup]) -> Group:
     first = members[0]
     execution = first.node.execution
     read_bytes, write_bytes = (first.bytes_of(kind) for kind in TRANSACTION_KINDS)
-    read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
+    read_us, write_us = (_if_any(size, execution.execution_us) for size in (read_bytes, write_bytes))
     return Group(
         members=tuple(members),
         nodes=first.nodes if len(members) == 1 else total(member.nodes for member in members),
@@ -48,9 +48,17 @@ def _group(members: Sequence[ProfileGroup]) -> Group:
         read_execution_us=read_us,
         write_execution_us=write_us,
         worst_extra_us=execution.worst_extra_us,
-        read_uncertainty_us=execution.standard_uncertainty_us(read_us),
-        write_uncertainty_us=execution.standard_uncertainty_us(write_us),
+        read_uncertainty_us=_if_any(read_bytes, lambda _: execution.standard_uncertainty_us(read_us)),
+        write_uncertainty_us=_if_any(write_bytes, lambda _: execution.standard_uncertainty_us(write_us)),
     )
+
+
+def _if_any(size_bytes: Number, time_us: Callable[[Number], Number]) -> Number:
+    """Time of a payload [us]; 0 where it has 0 bytes, for nothing is sent then."""
+    if is_everywhere(size_bytes <= 0):
+        return 0.0
+    us, has_data = time_us(size_bytes), size_bytes > 0
+    return us if is_everywhere(has_data) else choose(has_data, us, 0.0)
 
 
 def _runs_of_alike(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:

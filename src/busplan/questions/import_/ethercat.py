@@ -59,10 +59,9 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         yield ProfileLine("bus", "mailbox_bytes", max(mailboxes, key=lambda mailbox: mailbox.value))
     if any("every" in facts for facts in devices):
         yield ProfileLine("bus", "units", assumed("together", "no file says whether slower tasks meet in a cycle"))
-    starter = kind_named("ethercat").starter
-    master_us = next(line for line in starter.hosts[starter.host].splitlines() if line.startswith("master_us"))
-    value, _, note = master_us.partition("=")[2].partition("#")
-    yield ProfileLine("bus", "master_us", assumed(float(value), note.strip().removeprefix("assumed: ")))
+    ethercat = kind_named("ethercat")
+    host = ethercat.hosts()[ethercat.starter.host]
+    yield ProfileLine("bus", "master_us", assumed(float(host.own_us["ethercat"]), host.own_note()))
     yield ProfileLine("bus", "master_grade", assumed("assumed", "so half of it is its standard uncertainty"))
     yield ProfileLine("cycle", "period_us", period)
     slower_us = sum(map(frame_us, bus["slower"].value)) if "slower" in bus else 0.0
