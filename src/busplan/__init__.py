@@ -38,6 +38,7 @@ __all__ = [
     "PolledFigures",
     "Profile",
     "RecordedAnswer",
+    "RecordedTimelineAnswer",
     "ReportAnswer",
     "Sercos2Figures",
     "Sercos3Figures",
@@ -93,7 +94,7 @@ if TYPE_CHECKING:
     from busplan.questions.recorded import RecordedAnswer, recorded
     from busplan.questions.report import ReportAnswer, report
     from busplan.questions.sweep import SweepAnswer, sweep
-    from busplan.questions.timeline import TimelineAnswer, timeline
+    from busplan.questions.timeline import RecordedTimelineAnswer, TimelineAnswer, timeline
     from busplan.sections.profile import Profile
 else:
     # Loaded at first use, because the command line imports this package, too. Type checkers do not see this, so that
@@ -113,6 +114,7 @@ else:
         "CheckAnswer": "busplan.gate.check",
         "import_profile": "busplan.questions.import_",
         "ImportAnswer": "busplan.questions.import_",
+        "RecordedTimelineAnswer": "busplan.questions.timeline",
     }
     """Module of each name that the rule below does not find."""
 

@@ -45,7 +45,7 @@ def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path
         (["--set", "bus.nodes=1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
         (["--timing-model", "both"], "both"),
         (["--cycle", "0"], "cycle 0: expected a whole number from 1"),
-        (["--cycle", "first"], "--cycle first: expected a whole number; "),
+        (["--cycle", "first"], "--cycle first: expected a whole number from 1, worst or median"),
     ],
 )
 def test_what_cannot_be_done_is_said_and_leaves_nothing(
@@ -62,3 +62,43 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
 def test_a_drawing_takes_the_width_of_its_terminal(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
     _, shown = on_terminal("timeline", "paper-4ms", cwd=tmp_path, env={"COLUMNS": "117", "TERM": "dumb"})
     assert {len(line) for line in shown.splitlines() if line.count("|") == 2} == {117}
+
+
+def test_a_cycle_of_a_recording_is_shown_beside_the_plan(busplan: Run, tmp_path: Path) -> None:
+    busplan("emulate", "can-servo-8", "--cycles", "40", "-o", "bus.log", cwd=tmp_path)
+    log = (tmp_path / "bus.log").read_bytes()
+    beside = ("timeline", "can-servo-8", "--recording", "bus.log")
+    document = json.loads(busplan(*beside, "--format", "json", cwd=tmp_path).stdout)
+    assert (document["schema"], document["command"], document["chosen"], document["cycles"]) == (
+        1,
+        "timeline",
+        "worst",
+        39,
+    )
+    for lane in ("recorded", "planned"):
+        spent = sum(event["duration_us"] for event in document["events"] if event["lane"] == lane)
+        assert spent == pytest.approx(document[f"{lane}_us"])
+        assert sum(share[f"{lane}_us"] for share in document["shares"]) == pytest.approx(spent)
+    shown = busplan(*beside, "--cycle", "17", "--all", cwd=tmp_path)
+    assert (shown.returncode, shown.stderr) == (0, "")
+    for words in ("cycle 17 of 39 whole ones, from frame ", "planned ", "wire ", "feedback of node 3 (0x183)"):
+        assert words in shown.stdout
+    for arguments, message in (
+        (("--cycle", "40"), "--cycle 40: bus.log has no such whole cycle; its cycles are 1 to 39"),
+        (("--cycle", "0"), "--cycle 0: expected a whole number from 1, worst or median"),
+        (
+            ("--transaction", "feedback:1"),
+            "--transaction feedback:1: a recording is shown by whole cycles; leave it out",
+        ),
+        (("--channel", "can7"), "channel can7: no such channel; there are synthetic"),
+        (("-o", "bus.log", "--format", "json"), "--output bus.log"),
+    ):
+        refused = busplan(*beside, *arguments, cwd=tmp_path)
+        assert (refused.returncode, refused.stdout) == (2, "")
+        assert message in refused.stderr
+    for arguments, message in (
+        (("--cycle", "median"), "--cycle median: needs --recording FILE; a planned cycle has a number from 1"),
+        (("--channel", "can0"), "--channel: needs --recording FILE"),
+    ):
+        assert message in busplan("timeline", "can-servo-8", *arguments, cwd=tmp_path).stderr
+    assert (tmp_path / "bus.log").read_bytes() == log

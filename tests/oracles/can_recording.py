@@ -345,7 +345,7 @@ def in_log(machine: Machine) -> tuple[list[Logged], list[Logged], float]:
     start_us = (1 + random.random()) * machine.period_us
     end_us = start_us + machine.cycles * machine.period_us
     logged = [frame for frame in simulated(machine) if start_us <= frame.us < end_us]
-    stamped = list(_handed_over(logged, machine.latency_us, random)) if machine.latency_us else logged
+    stamped = list(handed_over(logged, machine.latency_us, random)) if machine.latency_us else logged
     return logged, stamped, 1_700_000_000 + random.random()
 
 
@@ -395,7 +395,7 @@ def _sooner_us(frames: list[Logged], period_us: float) -> float:
     return max(early - least for early, least in zip(early_us, accumulate(early_us, min), strict=True))
 
 
-def _handed_over(logged: list[Logged], latency_us: float, random: Random) -> Iterator[Logged]:
+def handed_over(logged: list[Logged], latency_us: float, random: Random) -> Iterator[Logged]:
     """Stamps of a driver that is late: frames that wait for it follow each other as fast as it takes them."""
     awake_us = last_us = 0.0
     for frame in logged:

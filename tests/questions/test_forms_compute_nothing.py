@@ -52,6 +52,12 @@ def recorded(profile: busplan.Profile, folder: Path) -> busplan.MeasuredAnswer:
     return busplan.measured(profile, path)
 
 
+def beside(profile: busplan.Profile, folder: Path) -> busplan.RecordedTimelineAnswer:
+    """A cycle of such a recording."""
+    recorded(profile, folder)
+    return busplan.timeline(profile, recording=next(folder.glob("recording.*")))
+
+
 Ask = Callable[[busplan.Profile, Path], Any]
 QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "calibrate": (lambda profile, _: busplan.calibrate(profile, TABLE), ("paper-1ms",)),
@@ -74,9 +80,10 @@ QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "timeline": (lambda profile, _: busplan.timeline(profile), KINDS),
 }
 """Each question, and the machines that it is asked of."""
+BESIDE = {"timeline of a recording": (beside, ("can-servo-8", "ethercat-servo-8", "can-motors-8"))}
 ASKED = [
     pytest.param(ask, profile, id=f"{question} {name}")
-    for question, (ask, names) in QUESTIONS.items()
+    for question, (ask, names) in {**QUESTIONS, **BESIDE}.items()
     for name, profile in machines(*names)
 ]
 

@@ -149,7 +149,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a cycle that is no number": (lambda: busplan.timeline("paper-4ms", cycle=True), "cycle True: expected a whole"),
     "a window from nowhere": (lambda: busplan.timeline("paper-4ms", from_us=float("nan")), "from_us nan: expected"),
     "a window to no float": (lambda: busplan.timeline("paper-4ms", to_us=10**400), "to_us 1"),
-    "a window of words": (lambda: busplan.timeline("paper-4ms", from_us="4ms"), "from_us '4ms': expected a finite"),  # type: ignore[arg-type]
+    "a window of words": (lambda: busplan.timeline("paper-4ms", from_us="4ms"), "from_us '4ms': expected a finite"),  # type: ignore[call-overload]
     "half a transaction": (
         lambda: busplan.timeline("paper-4ms", transaction=("read",)),  # type: ignore[arg-type]
         "transaction ('read',): expected one of one node",

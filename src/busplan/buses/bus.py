@@ -33,6 +33,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, Rule
+from busplan.buses.waterfall import RecordedCycles
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sourced import Constants
@@ -189,6 +190,17 @@ class Bus(ABC):
         """
         latencies = "; latencies in a CSV file are for busplan calibrate" if self.calibration else ""
         raise BusplanError(f"{path}: busplan reads no recordings of bus.kind {self.kind}{latencies}")
+
+    def recorded_cycles(
+        self,
+        network: Network,  # noqa: ARG002 - a kind may have none
+        path: "Path",
+        *,
+        channel: str | None,  # noqa: ARG002
+        progress: Progress,  # noqa: ARG002
+    ) -> RecordedCycles:
+        """The whole cycles of a recording beside those of the plan; arguments and errors as in `recorded`."""
+        raise BusplanError(f"{path}: busplan reads no recordings of bus.kind {self.kind}")
 
     def emulator(self) -> Emulator | None:
         """Emulator of the kind; None if it writes no recordings."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -28,6 +28,10 @@ from busplan.profile.changes import change_options, period_option, shell_word
 if TYPE_CHECKING:
     from busplan.forms.blocks import Command, Report
     from busplan.questions.base.answer import Answer
+
+
+_MOST_DIGITS: Final = 9
+"""Digits of a cycle's number, at most."""
 
 
 @command(period="several", is_drawn=True)
@@ -163,7 +167,7 @@ def _naming(call: Call) -> Iterator[None]:
         raise BusplanError(*(f"{name}: {problem}{typed}" for problem in error.problems)) from None
 
 
-@command(period="one", is_drawn=True)
+@command(period="one", is_drawn=True, reads=lambda recording, **_: () if recording is None else (recording,))
 def timeline_command(
     call: Call,
     from_: Annotated[
@@ -192,12 +196,12 @@ def timeline_command(
         ),
     ] = None,
     cycle: Annotated[
-        int | None,
+        str | None,
         typer.Option(
-            metavar="N",
+            metavar="N|worst|median",
             help="Show the N-th cycle, from 1, of groups with rates of their own (every = n, on CAN and "
-            "EtherCAT); beyond their common multiple the cycles repeat.  [default: the fullest, which the "
-            "verdict is for]",
+            "EtherCAT); beyond their common multiple the cycles repeat. Of --recording its N-th, the longest or "
+            "the median one.  [default: the fullest, which the verdict is for; of a recording worst]",
         ),
     ] = None,
     timing_model: Annotated[
@@ -208,23 +212,62 @@ def timeline_command(
             "standard.  [default: the one that decides]",
         ),
     ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show a cycle of this recording beside the same cycle of the plan: of EtherCAT a pcap or pcapng "
+            "file, of CAN a log of candump, ASC, BLF or TRC, or a capture of SocketCAN.  [default: the plan alone]",
+        ),
+    ] = None,
+    channel: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
+    ] = None,
 ) -> "Answer":
     """Show one communication cycle as events, node by node and to scale.
 
     The events are everything that takes time on the wire, in its order, the time for non-periodic data, and the rest of
     the slice. Without that rest they add up to the required time of `busplan capacity`. A cycle that overruns its slice
     is shown whole, and says so. Every node is computed with the hops of the farthest, unless the profile says
-    otherwise. Times are in us. Exits 0 whatever the verdict.
+    otherwise.
+
+    With --recording it shows where the time of a recorded cycle went: frames at their length on the wire, and between
+    them what was waited for (nodes, or the host with its adapter), frames that are not of the cycle, and what cannot be
+    attributed. Both cycles go from their first frame to their last one; their shares add up to them. Times are in us.
+    Exits 0 whatever the verdict.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
+    window = {"--from": from_, "--to": to, "--transaction": transaction, "--timing-model": timing_model}
+    if recording is not None:
+        for option, given in window.items():
+            if given is not None:
+                raise BusplanError(f"{option} {given}: a recording is shown by whole cycles; leave it out")
+        with progress_bar("recording") as progress:
+            return busplan.timeline(
+                call.profile, recording=recording, cycle=_cycle(cycle), channel=channel, progress=progress
+            )
+    require_company("--recording FILE", {"--channel": channel}, is_given=False)
+    number = _cycle(cycle)
+    if isinstance(number, str):
+        raise BusplanError(f"--cycle {cycle}: needs --recording FILE; a planned cycle has a number from 1")
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
     return busplan.timeline(
-        call.profile, timing_model=timing_model, from_us=from_us, to_us=to_us, transaction=transaction, cycle=cycle
+        call.profile, timing_model=timing_model, from_us=from_us, to_us=to_us, transaction=transaction, cycle=number
     )
+
+
+def _cycle(text: str | None) -> "int | Literal['worst', 'median'] | None":
+    """Number of a cycle, or the rule that chooses one."""
+    match text:
+        case None | "worst" | "median":
+            return text
+    if not text.isascii() or not text.isdigit() or len(text) > _MOST_DIGITS or not int(text):
+        raise BusplanError(f"--cycle {text}: expected a whole number from 1, worst or median")
+    return int(text)
 
 
 def complete_figure(incomplete: str) -> list[str]:

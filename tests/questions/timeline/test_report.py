@@ -22,7 +22,7 @@ def plan(**changes: object) -> busplan.TimelineAnswer:
 
 
 def window(**asked: Any) -> busplan.TimelineAnswer:
-    return busplan.timeline("paper-4ms", **asked)
+    return busplan.timeline("paper-4ms", **asked, recording=None)
 
 
 def drawn(one: busplan.TimelineAnswer, width: int | None = None) -> list[str]:

@@ -19,6 +19,7 @@ from busplan.buses.can.traffic import traffic_of
 from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
+from busplan.buses.waterfall import RecordedCycles
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -233,6 +234,14 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, channel=channel, progress=progress)
+
+    def recorded_cycles(
+        self, network: Network, path: "Path", *, channel: str | None, progress: Progress
+    ) -> RecordedCycles:
+        """The whole cycles of a CAN log beside those of the plan."""
+        from busplan.buses.can.waterfall import recorded_cycles  # as above
+
+        return recorded_cycles(network, path, channel=channel, progress=progress)
 
 
 BUS: Final = Can()

@@ -41,6 +41,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
+from busplan.buses.waterfall import RecordedCycles
 from busplan.elementwise import Number, choose, larger
 from busplan.english import plural
 from busplan.errors import BusplanError
@@ -298,11 +299,24 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         self, network: Network, path: "Path", *, share: float, channel: str | None, progress: Progress
     ) -> Recorded:
         """Comparison of a capture of the master's port with the plan."""
-        if channel is not None:
-            raise BusplanError(f"channel {channel}: a capture of EtherCAT is of one port; only CAN logs have channels")
+        _require_no_channel(channel)
         from busplan.buses.ethercat.recorded import recorded  # Only one command needs it, and it loads numpy.
 
         return recorded(network, path, share=share, progress=progress)
+
+    def recorded_cycles(
+        self, network: Network, path: "Path", *, channel: str | None, progress: Progress
+    ) -> RecordedCycles:
+        """The whole cycles of a capture of the master's port beside those of the plan."""
+        _require_no_channel(channel)
+        from busplan.buses.ethercat.waterfall import recorded_cycles  # As above.
+
+        return recorded_cycles(network, path, progress=progress)
+
+
+def _require_no_channel(channel: str | None) -> None:
+    if channel is not None:
+        raise BusplanError(f"channel {channel}: a capture of EtherCAT is of one port; only CAN logs have channels")
 
 
 BUS = Ethercat()

@@ -87,14 +87,14 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
         raise BusplanError(
             f"{path}: none of its {len(frames.times_ns):,} EtherCAT frames returned; record both ways of the port"
         )
-    seen = _Seen(network, frames, share)
+    seen = Seen(network, frames, share)
     figures = tuple(seen.figures())
     day = day_of(int(frames.times_ns[0]))
     compared = Recorded(figures, tuple(seen.remarks()), seen.edits(), day, seen.shows_nothing())
     return compared.unless_synthetic(frames.notes.synthetic)
 
 
-class _Seen:
+class Seen:
     """A recording, and the values that several figures derive from it."""
 
     def __init__(self, network: Network, frames: EthercatFrames, share: float) -> None:
