@@ -100,7 +100,7 @@ def test_an_axis_without_commands_or_feedback_has_no_loop(name: str) -> None:
 
 
 def test_no_pdos_are_an_empty_list() -> None:
-    changes = {"payload.read_bytes": None, "payload.feedback_pdos": []}
+    changes: dict[str, Any] = {"payload.read_bytes": None, "payload.feedback_pdos": []}
     arm = busplan.load_profile("can-servo-8", changes=changes)
     assert required_us(arm) == required_us(busplan.load_profile("can-servo-8", changes={"payload.read_bytes": 0}))
     with pytest.raises(BusplanError, match="is empty, so nothing is sent"):

@@ -343,3 +343,21 @@ def test_what_is_no_regular_file_is_not_replaced(refused: Refused, tmp_path: Pat
     assert refused("init", name, "--force", cwd=tmp_path) == f"{name}: cannot be written: is not a regular file"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link.toml", "pipe.toml"]
     assert (tmp_path / "pipe.toml").is_fifo()
+
+
+def test_servos_of_a_robot_have_one_axis_their_own_data_and_no_circle(run: Run, tmp_path: Path) -> None:
+    for given in (("--nodes", 6), ("--axes", 6)):
+        run("init", "arm", "--force", "--bus", "dynamixel", *given, cwd=tmp_path)
+        data = tomllib.loads((tmp_path / "arm.toml").read_text(encoding="utf-8"))
+        assert (data["bus"]["nodes"], data["node"]["axes"]) == (6, 1)
+        # Current, velocity and position of an X servo, and its goal position.
+        assert (data["payload"]["read_bytes"], data["payload"]["write_bytes"]) == (10, 4)
+        assert not data.keys() & {"circle", "servo", "tolerance", "mechanics"}
+        # A new servo waits 500 us.
+        assert "return_delay_us" not in data["bus"]
+
+
+def test_axes_alone_get_the_nodes_that_they_need(run: Run, tmp_path: Path) -> None:
+    run("init", "press", "--axes", 6, cwd=tmp_path)
+    data = tomllib.loads((tmp_path / "press.toml").read_text(encoding="utf-8"))
+    assert (data["bus"]["nodes"], data["node"]["axes"]) == (2, 3)

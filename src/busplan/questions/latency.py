@@ -27,6 +27,7 @@ from busplan.questions.base.arguments import (
 )
 from busplan.questions.fit.figures import FitFigures, figures
 from busplan.questions.fit.network import not_applicable, warnings_of, with_payloads
+from busplan.sections.base import TRANSACTION_KINDS
 from busplan.sections.cycle import TableExecution
 from busplan.sections.profile import Profile
 
@@ -142,7 +143,7 @@ def latency(
         given = one_or_several(payload_bytes, name="payload_bytes")
         sizes = [whole_number(size, name="payload_bytes") for size in given]
         _require_execution(network.profile, sizes)
-        networks = [with_payloads(network, [(size, size)] * len(network.profile.node_groups)) for size in sizes]
+        networks = [with_payloads(network, [*_payloads(network, size)]) for size in sizes]
     tables = tuple(_transactions(variant, models) for variant in networks)
     deciding = tuple(figures(variant, model=variant.bus.deciding_model) for variant in networks)
     return LatencyAnswer(
@@ -153,6 +154,13 @@ def latency(
         tuple(_deadline_sentence(networks, tables, deciding)),
         tuple(_notes(networks)),
     )
+
+
+def _payloads(network: Network, size: int) -> Iterator[tuple[int, int]]:
+    """A payload for the read and the write of each group; nodes that are only read or written stay so [bytes]."""
+    for nodes in network.profile.node_groups:
+        read, write = (size if nodes.bytes_of(kind) else 0 for kind in TRANSACTION_KINDS)
+        yield read, write
 
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
