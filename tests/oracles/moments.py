@@ -88,7 +88,7 @@ def of_capture(machine: ethercat.Machine, cycles: int, *, seed: int) -> tuple[li
     first: dict[int, int] = {}
     for number, packet in enumerate(packets, start=1):
         cycle = packet.trip.cycle
-        is_data = any(command in PROCESS and at != MAILBOXES for command, at, _ in packet.trip.datagrams)
+        is_data = _has_process_data(packet.trip.datagrams)
         if cycle in machine.lost and not packet.returned:
             found["lost frames"].append(Event(number))
         if cycle in machine.wrong and packet.returned and is_data:
@@ -100,10 +100,14 @@ def of_capture(machine: ethercat.Machine, cycles: int, *, seed: int) -> tuple[li
     sent = Counter(packet.trip.cycle for packet in packets if not packet.returned and not packet.trip.is_poll)
     seen = sorted(cycle for cycle in first if sent[cycle] == len(machine.frames(cycle)))
     for before, after in pairwise(seen):
-        due = sum(bool(machine.frames(cycle)) for cycle in range(before + 1, after))
+        due = sum(any(map(_has_process_data, machine.frames(cycle))) for cycle in range(before + 1, after))
         if due:
             found["cycles without a frame"].append(Event(first[before], due))
     return [packet.us for packet in packets], found
+
+
+def _has_process_data(datagrams: ethercat.Datagrams) -> bool:
+    return any(command in PROCESS and at != MAILBOXES for command, at, _ in datagrams)
 
 
 def first_and_worst(

@@ -243,10 +243,13 @@ class RecordedFigure(NamedTuple):
         if not len(events.values):
             return self
         beyond = self._beyond(events.values - (self.planned or 0.0))
-        worst = events.earliest(beyond == beyond.max())
+        is_worst = beyond == beyond.max()
+        worst = events.earliest(is_worst)
         chosen = beyond > (self._most if self.verdict == "outside" else self._rounding)
         if self.unit == "1" and self.sense == "at most":
             chosen[:] = True
+        if self.verdict == "outside" and not chosen.any():
+            chosen = is_worst
         has_first = self.verdict in ("outside", "not shown") and chosen.any()
         first = events.earliest(chosen) if has_first else (None, None)
         return self._replace(first_s=first[0], first_frame=first[1], worst_s=worst[0], worst_frame=worst[1])

@@ -94,7 +94,7 @@ class Lateness(NamedTuple):
     uncertainty: float
     """Standard uncertainty [us]."""
     late_us: Floats
-    """Delay of each event after the earliest, by the likeliest period and not by the most favourable one [us]."""
+    """Delay of each event after the earliest, by the likeliest period or by the most favourable one: the less [us]."""
 
 
 def quantile(values: Floats, share: float) -> Quantile:
@@ -142,7 +142,8 @@ def lateness(events: PeriodicEvents, share: float) -> Lateness:
     value = latest.value + earliest.value
     others = max(spread_us(sign * _COVERAGE * events.uncertainty_us) for sign in (-1, 1)) - value
     parts = latest.uncertainty or 0.0, earliest.uncertainty or 0.0, max(others, 0.0) / _COVERAGE, events.doubt_us
-    return Lateness(value, hypot(*parts), events.late_us + quantile(-events.late_us, early).value)
+    surely_us = np.minimum(late + earliest.value, events.late_us + quantile(-events.late_us, early).value)
+    return Lateness(value, hypot(*parts), surely_us)
 
 
 def _ranked(values: Floats, share: float) -> float:
