@@ -538,8 +538,8 @@ def test_the_profile_schema_refuses_what_has_another_shape(validator: Any, code:
 def test_every_key_of_the_profile_schema_is_described_with_its_unit(schema: dict[str, Any]) -> None:
     units = {
         "per_byte_us": "[us/byte]", "um_per_m": "[um/m]", "mm_per_min": "[mm/min]", "per_s2": "[1/s^2]",
-        "per_s": "[1/s]", "mm_s": "[mm/s]", "us": "[us]", "mm": "[mm]", "bytes": "[bytes]", "deg": "[deg]",
-        "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "kbit_s": "[kbit/s]",
+        "per_s": "[1/s]", "frames_s": "[frames/s]", "mm_s": "[mm/s]", "us": "[us]", "mm": "[mm]", "bytes": "[bytes]",
+        "deg": "[deg]", "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "kbit_s": "[kbit/s]",
         "mbit_s": "[Mbit/s]", "s": "[s]",
     }  # fmt: skip
     # A grade has the name of the value that it grades, and no unit.

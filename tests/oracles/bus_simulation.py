@@ -194,6 +194,8 @@ def simulate(scene: Scene, execution: Execution, *, cycles: int = 1) -> Run:
         requests = [(kind, number) for kind in ("read", "write") for number in range(1, len(scene.nodes) + 1)]
         for place, (kind, number) in enumerate(requests):
             node = scene.nodes[number - 1]
+            if not (node.read_bytes if kind == "read" else node.write_bytes):
+                continue
             answer: Answer = scene.read if kind == "read" else scene.write
             for _ in range(scene.busy.count(place)):
                 ready_us = bus.send(

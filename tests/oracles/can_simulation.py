@@ -233,14 +233,20 @@ class _Bus:
             self.feedback[cycle][number] = ready_us - cycle * self.period_us
             for frame in node.feedback:
                 self.put(ready_us, frame, FEEDBACK, cycle, number)
+        if not self.missing[cycle]:
+            self.compute(now_us, cycle)
 
     def feedback_arrived(self, now_us: int, cycle: int, number: int) -> None:
         """When its program has the last feedback the host begins to compute."""
         self.missing[cycle] -= 1
+        self.ends[cycle] = max(self.ends[cycle], now_us - cycle * self.period_us)
         self.known_us[cycle] = max(self.known_us[cycle], now_us + self.adapter_us[cycle][number][0])
-        if self.missing[cycle]:
-            return
-        ready_us = self.known_us[cycle] + self.host_us[cycle]
+        if not self.missing[cycle]:
+            self.compute(self.known_us[cycle], cycle)
+
+    def compute(self, now_us: int, cycle: int) -> None:
+        """The host computes the commands."""
+        ready_us = now_us + self.host_us[cycle]
         for place, node in enumerate(self.nodes):
             queued_us = ready_us + self.adapter_us[cycle][place][1]
             for frame in node.command if node.is_due(cycle) else ():

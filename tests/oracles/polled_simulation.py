@@ -104,7 +104,7 @@ def servos_us(
             wire.wait(turn)
             wire.send(answer)
 
-    for part in range(reads):
+    for part in range(reads if read else 0):
         size = read // reads + (part < read % reads)
         answer = kind.head + status + bytes(size) + kind.tail
         if is_sync:
@@ -112,6 +112,8 @@ def servos_us(
         else:
             for _ in range(nodes):
                 talk(frame(b"\x02", kind.address + kind.length), [answer])
+    if not write:
+        return float(wire.now * bit_us)
     if is_sync:
         talk(frame(b"\x83", kind.address + kind.length + bytes(nodes * (1 + write))), [])
     else:
@@ -132,12 +134,13 @@ def modbus_us(
     """A cycle of Modbus RTU: silence ends each frame, and a node answers behind it."""
     wire, bit_us = Wire(11), Fraction(1000) / Fraction(rate)
     silence = Fraction(77, 2) if rate <= 19.2 else Fraction(1750) / bit_us
+    reading = [(b"afaaqqcc", b"afn" + data + b"cc") for data in registers(read, reads)] if read else []
+    writing = [(b"afaaqqn" + registers(write)[0] + b"cc", b"afaaqqcc")] if write else []
     frames = (
         [(b"af" + bytes(4) + bytes(4) + b"n" + registers(write)[0] + b"cc", b"afn" + registers(read)[0] + b"cc")]
         * nodes
-        if is_exchange
-        else [(b"afaaqqcc", b"afn" + data + b"cc") for data in registers(read, reads)] * nodes
-        + [(b"afaaqqn" + registers(write)[0] + b"cc", b"afaaqqcc")] * nodes
+        if is_exchange and read and write
+        else reading * nodes + writing * nodes
     )
     for request, answer in frames:
         wire.send(request)

@@ -77,8 +77,15 @@ def test_a_payload_needs_one_of_both_keys() -> None:
         "gantry.toml:10:2: payload.write_bytes: missing key; expected write_bytes, write_bytes_per_axis or both"
     ]
     assert "payload.read_bytes: missing key" in refused("")[0]
-    for wrong in ("0", "-1", "1.5", "true"):
+    for wrong in ("-1", "1.5", "true"):
         assert "payload.read_bytes_per_axis = " in refused(f"read_bytes_per_axis = {wrong}\nwrite_bytes = 4")[0]
+
+
+def test_one_direction_may_have_no_data_and_both_may_not() -> None:
+    table = 'kind = "table"\npayload_bytes = [4, 16]\ntime_us = [36.7, 36.3]'
+    assert profile("read_bytes_per_axis = 4\nwrite_bytes = 0", table)
+    (message,) = refused("read_bytes_per_axis = 0\nwrite_bytes = 0")
+    assert "payload.write_bytes = 0: makes 0 bytes, and so does what is read" in message
 
 
 def test_a_table_must_hold_what_all_axes_make() -> None:

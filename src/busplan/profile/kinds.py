@@ -206,7 +206,7 @@ def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[Fie
     field = model.model_fields.get(str(path[0]))
     inner = [] if field is None else models_of(field.annotation)
     rest = path[2:] if len(path) > 1 and isinstance(path[1], int) else path[1:]
-    if field is not None and not (rest and inner):
+    if field is not None and not rest:
         yield field
     for section in inner if rest else []:
         yield from _fields(section, rest)
@@ -231,7 +231,7 @@ def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefi
         sections = [f"{name}.{table}" for table in names.get(name, ())] if _are_several(field.annotation) else [name]
         for section, section_model in product(sections, inner):
             yield from value_keys(section_model, {}, f"{prefix}{section}.")
-        if not inner and (_is_number(field.annotation) or _words(field.annotation)):
+        if _words(field.annotation) or (not inner and _is_number(field.annotation)):
             yield f"{prefix}{name}"
 
 

@@ -289,6 +289,10 @@ class GroupSection(NodeSection, PayloadSection):
     axes: GroupAxes = Field(examples=[4])
 
     def _problems(self) -> Iterator[Problem]:
+        for kind in TRANSACTION_KINDS:
+            if any(self._parts(kind)) and not (self.may_be_empty or self.bytes_of(kind, axes=self.axes)):
+                why = f"makes a payload of 0 bytes: the group has no axes; give {kind}_bytes"
+                yield Problem(why, key=self.key_of(kind), kind="inconsistent")
         if not (self.may_be_empty or any(self.bytes_of(kind, axes=self.axes) for kind in TRANSACTION_KINDS)):
             yield Problem(_NO_DATA, key=self.key_of("write"), kind="inconsistent")
 

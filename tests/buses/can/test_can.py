@@ -355,7 +355,7 @@ def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None
     done = run("init", "press", "--bus", "can", "--axes", "10", cwd=tmp_path)
     assert done.returncode == 0
     assert "--period 10ms" in done.stderr
-    assert re.search(r"\npress  CAN, 4 nodes, 10 axes, 10 ms +FITS\n", done.stderr)
+    assert re.search(r"\npress  CAN, 3 nodes, 10 axes, 10 ms +FITS\n", done.stderr)
     found = busplan.load_profile(tmp_path / "press.toml")
     assert (found.bus.kind, len(found.group)) == ("can", 2)
     done = run("init", "other", "--bus", "lon", cwd=tmp_path)

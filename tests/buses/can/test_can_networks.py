@@ -164,8 +164,8 @@ def test_a_machine_on_another_bus_keeps_its_payload() -> None:
         assert one["required_us"] == other["required_us"]
 
 
-def test_no_pdo_is_empty_or_too_long() -> None:
-    for lengths in ([], [0], [65], [1, 1, 1, 1, 1]):
+def test_no_pdo_has_0_bytes_or_is_too_long() -> None:
+    for lengths in ([0], [65], [1, 1, 1, 1, 1]):
         with pytest.raises(busplan.BusplanError, match="feedback_pdos"):
             profile(payload={"feedback_pdos": lengths, "write_bytes": 8})
 

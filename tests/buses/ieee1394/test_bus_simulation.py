@@ -161,6 +161,9 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
 
     def group(nodes: int) -> Nodes:
         read_bytes, write_bytes, read_us = draw(sizes), draw(sizes), draw(times_us)
+        # Some nodes are only read, others only written.
+        one_way = draw(st.sampled_from(("", "", "", "read", "write")))
+        read_bytes, write_bytes = read_bytes * (one_way != "write"), write_bytes * (one_way != "read")
         write_us = read_us if write_bytes == read_bytes else draw(times_us)
         return Nodes(nodes, read_bytes, write_bytes, read_us, write_us, draw(st.just(0.0) | st.floats(0, 10)))
 
@@ -230,6 +233,13 @@ EXACT = {
     "with priority": Case((nodes_of(3, read_us=5.0),), priority=True),
     "read and write differ": Case((nodes_of(3, read_us=5.0, write_us=50.0, size=100),)),
     "two sorts of nodes": Case((nodes_of(3, read_us=5.0, size=4), nodes_of(2, read_us=70.0, size=200))),
+    "some only read, some only written": Case(
+        (
+            nodes_of(3, read_us=50.0)._replace(write_bytes=0),
+            nodes_of(2, read_us=50.0)._replace(read_bytes=0),
+            nodes_of(2, read_us=50.0),
+        )
+    ),
     "own hops": Case((nodes_of(3, read_us=50.0),), farthest=False, own=True, root="host"),
     "own hops of two sorts": Case(
         (nodes_of(3, read_us=5.0, size=4), nodes_of(2, read_us=70.0, size=200)), farthest=False, own=True, root="host"

@@ -245,6 +245,12 @@ def test_the_ends_by_hand(adapter: object, least_us: float, most_us: float) -> N
     assert ends_us(servo(bus__adapter=adapter)) == pytest.approx((least_us, most_us))
 
 
+@pytest.mark.parametrize(("host_us", "seen_us"), [(300.0, 0.0), (680.0, 0.0), (800.0, 120.0)])
+def test_the_hosts_time_hides_in_the_wait_of_the_first_write(host_us: float, seen_us: float) -> None:
+    least_us, most_us = ends_us(servo(bus__adapter="ftdi-low-latency", bus__host_us=host_us))
+    assert (least_us, most_us) == pytest.approx((340 + 5 * 1000 + seen_us, 13_980 + host_us))
+
+
 @pytest.mark.parametrize(
     ("period_us", "verdict"),
     [(5339.0, "does not fit"), (5341.0, "not shown to fit"), (13_979.0, "not shown to fit"), (13_981.0, "fits")],

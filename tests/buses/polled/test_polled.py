@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -110,8 +110,8 @@ def test_profibus_lies_between_its_ends_and_the_ends_are_simulated(
     st.sampled_from(["dynamixel-2", "feetech"]),
     st.sampled_from([57.6, 115.2, 1000.0]),
     st.integers(1, 40),
-    st.integers(1, 60),
-    st.integers(1, 60),
+    st.integers(0, 60),
+    st.integers(0, 60),
     st.integers(1, 4),
     st.booleans(),
     st.sampled_from([0.0, 250.0, 500.0]),
@@ -126,6 +126,7 @@ def test_servos_are_those_of_the_simulation(
     is_sync: bool,
     delay_us: float,
 ) -> None:
+    assume(read or write)
     profile = servo(
         bus__protocol=protocol,
         bus__bit_rate_kbit_s=rate,
@@ -155,9 +156,10 @@ def modbus(rate: float = 19.2, **changes: Any) -> Profile:
 
 
 @given(
-    st.sampled_from([9.6, 19.2, 38.4, 115.2]), st.booleans(), st.integers(1, 80), st.integers(1, 80), st.integers(1, 4)
+    st.sampled_from([9.6, 19.2, 38.4, 115.2]), st.booleans(), st.integers(0, 80), st.integers(0, 80), st.integers(1, 4)
 )
 def test_modbus_is_that_of_the_simulation(rate: float, is_exchange: bool, read: int, write: int, reads: int) -> None:
+    assume(read or write)
     reads = 1 if is_exchange else reads
     way = "exchange" if is_exchange else "single"
     profile = modbus(rate, bus__requests=way, bus__reads=reads, payload__read_bytes=read, payload__write_bytes=write)

@@ -141,7 +141,7 @@ class CanBus(BusSection):
     )
     max_frames_s: FramesPerSecond | None = Field(
         default=None,
-        description="Most frames a second that the host's adapter sends and receives, on average",
+        description="Most frames that the host's adapter sends and receives, on average [frames/s]",
         examples=[16_200],
     )
     queue: Queue | None = Field(

@@ -208,7 +208,7 @@ def _shares_of_load(network: Network) -> Iterator[_Share]:
 
 
 def _is_assumed(profile: Profile, key: str) -> bool:
-    return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
+    return isinstance(value_at(profile, key), int | float | str) and given(profile, key).grade == "assumed"
 
 
 def _execution_shares(figures: CycleFigures, network: Network, variance: float) -> list[_Share]:
