@@ -58,6 +58,12 @@ def beside(profile: busplan.Profile, folder: Path) -> busplan.RecordedTimelineAn
     return busplan.timeline(profile, recording=next(folder.glob("recording.*")))
 
 
+def alone(profile: busplan.Profile, folder: Path) -> busplan.RecordedAnswer:
+    """What its log has without a plan."""
+    recorded(profile, folder)
+    return busplan.recorded(folder / "recording.log")
+
+
 Ask = Callable[[busplan.Profile, Path], Any]
 QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "calibrate": (lambda profile, _: busplan.calibrate(profile, TABLE), ("paper-1ms",)),
@@ -73,8 +79,9 @@ QUESTIONS: dict[str, tuple[Ask, tuple[str, ...]]] = {
     "import_profile": (lambda _, __: busplan.import_profile([FILES / "machine.dbc"]), ("can-servo-8",)),
     "latency": (lambda profile, _: busplan.latency(profile), KINDS),
     "map_": (lambda profile, _: busplan.map_(profile, x=X, y=Y), KINDS),
-    "measured": (recorded, ("can-servo-8", "ethercat-servo-8")),
+    "measured": (recorded, ("can-servo-8", "can-motors-8", "ethercat-servo-8")),
     "plan": (lambda profile, _: busplan.plan(profile, free=["period"]), KINDS),
+    "recorded": (alone, ("can-servo-8",)),
     "report": (lambda profile, _: busplan.report(profile, circle=False), ("paper-1ms",)),
     "sweep": (lambda profile, _: busplan.sweep(profile, vary=Y), KINDS),
     "timeline": (lambda profile, _: busplan.timeline(profile), KINDS),

@@ -209,6 +209,16 @@ def test_motors_without_sync_keep_their_plan_and_show_each_fault(access: str, tm
     ] == 7
 
 
+def test_the_time_of_the_host_between_requests_has_its_adapter_in_it(tmp_path: Path) -> None:
+    plan = busplan.load_profile("can-motors-8", changes={"bus.host_write_us": 60, "bus.host_read_us": 90})
+    busplan.emulate(plan, cycles=200).save(tmp_path / "motors.log")
+    assert busplan.measured(plan, tmp_path / "motors.log").outside == ()
+    found = busplan.measured("can-motors-8", tmp_path / "motors.log")
+    (host,) = (figure for figure in found.figures if figure.quantity == "next request of the host")
+    assert (host.planned, host.verdict) == (20, "outside")
+    assert host.recorded == pytest.approx(170, abs=3)
+
+
 def test_a_fault_has_its_place(refused: Refused, tmp_path: Path) -> None:
     log = str(tmp_path / "any.log")
     assert "has no SYNC" in refused("emulate", "can-motors-8", "--fault", "late-command", "-o", log)
