@@ -317,6 +317,17 @@ def test_the_latest_node_is_named_and_not_the_one_with_the_longest_wait(folder: 
     assert found.late_us == pytest.approx(400, abs=30)
 
 
+def test_the_adapter_is_in_the_time_of_the_host(folder: Path) -> None:
+    plan = busplan.load_profile(
+        "can-motors-8", changes={"bus.nodes": 2, "bus.host_read_us": 50, "bus.host_write_us": 70}
+    )
+    answer = shown(folder, rows((0, 0x141), (300, 0x241), (500, 0x142), (800, 0x242), late={}), plan)
+    (host,) = (share for share in answer.shares if share.waits_for == "host")
+    assert (host.recorded_us, host.planned_us) == (pytest.approx(200 - 115, abs=8), pytest.approx(20 + 50 + 70))
+    assert "adapter" in {event.waits_for for event in answer.planned_events}
+    assert "host and adapter" in str(answer)
+
+
 @pytest.mark.parametrize("late_us", [None, 500.0])
 def test_a_request_behind_one_without_an_answer_waits_for_nobody_knows_whom(
     folder: Path, late_us: float | None
