@@ -52,8 +52,8 @@ def inputs(profile: Profile) -> dict[str, tuple[float | str, str]]:
     model = kind_named(profile.bus.kind).deciding_model
     for figure in ("required_us", "uncertainty_us", "bias_us"):
         with suppress(BusplanError):
-            (derived,) = busplan.explain(profile, figure, timing_model=model).derivations
-            found |= {given.name: (given.value, given.grade) for given in derived.inputs}
+            for derived in busplan.explain(profile, figure, timing_model=model).derivations:
+                found |= {given.name: (given.value, given.grade) for given in derived.inputs}
     return found
 
 
@@ -197,7 +197,7 @@ def test_a_constant_is_looked_up_in_the_call(module: Path) -> None:
 def test_names_in_formulas_are_constants_and_each_constant_is_used(folder: Path) -> None:
     texts = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
     used = set(re.findall(r"\bc\.([A-Z][A-Z0-9_]+)", texts))
-    named = set(re.findall(r"[\"\[]([A-Z][A-Z0-9_]+)[\"\]]", texts))
+    named = set(re.findall(r"[\"\[]([A-Z][A-Z0-9_]+)[\"\[\]]", texts))
     kinds = [
         kind for kind in kind_names() if type(kind_named(kind)).__module__.startswith(f"busplan.buses.{folder.name}.")
     ]

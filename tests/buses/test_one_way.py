@@ -57,17 +57,18 @@ def test_a_grid_down_to_no_data_is_its_points(name: str, way: str) -> None:
 
 
 def test_what_is_not_sent_takes_no_time_by_hand() -> None:
-    # 14 servos at 1 Mbit/s: a sync write alone; a sync read and its answers alone, each 50 us behind the one before.
-    arm = busplan.load_profile("dynamixel-arm-14", changes={"payload.read_bytes": 0})
+    # 14 servos at 1 Mbit/s: a sync write alone; a sync read and its answers alone, each 22 us behind the one before.
+    alone: dict[str, Any] = {"bus.adapter": "none", "bus.host_us": 0.0}
+    arm = busplan.load_profile("dynamixel-arm-14", changes={"payload.read_bytes": 0, **alone})
     assert required_us(arm) == 10 * (14 + 14 * (1 + 4))
-    arm = busplan.load_profile("dynamixel-arm-14", changes={"payload.write_bytes": 0, "bus.adapter_us": 0.0})
-    assert required_us(arm) == 10 * (14 + 14) + 14 * (50 + 10 * (11 + 10))
+    arm = busplan.load_profile("dynamixel-arm-14", changes={"payload.write_bytes": 0, **alone})
+    assert required_us(arm) == 10 * (14 + 14) + 14 * (22 + 10 * (11 + 10))
     # 6 boards of Modbus: function 16 writes two registers, and no function 23 does both.
     for requests in ("exchange", "single"):
         changes: dict[str, Any] = {"bus.protocol": "modbus-rtu", "bus.nodes": 6, "bus.bit_rate_kbit_s": 38.4}
-        changes |= {"bus.requests": requests, "bus.adapter_us": 0.0, "payload.read_bytes": 0}
+        changes |= {"bus.requests": requests, "payload.read_bytes": 0, **alone}
         boards = busplan.load_profile("dynamixel-arm-14", changes=changes)
-        assert required_us(boards) == pytest.approx(6 * ((9 + 4 + 8) * 11 / 0.0384 + 2 * 1750 + 50))
+        assert required_us(boards) == pytest.approx(6 * ((9 + 4 + 8) * 11 / 0.0384 + 2 * 1750 + 22))
     # EtherCAT: each of 8 drives has 12 bytes less in the frame, of 0.08 us each.
     drives = [with_bytes("ethercat-servo-8", "read", size) for size in (12, 0)]
     assert required_us(drives[0]) - required_us(drives[1]) == pytest.approx(8 * 12 * 0.08)

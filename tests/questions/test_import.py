@@ -10,7 +10,7 @@ import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "resvg_py", "scipy", "tomllib", "tomli_w", "json"}
 FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
-WITH_NUMPY = ("evidence", "sweep", "map_", "explore", "report")
+WITH_NUMPY = ("evidence", "sweep", "map_", "explore", "report", "recorded")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
 
 

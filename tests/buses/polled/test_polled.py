@@ -116,8 +116,8 @@ def test_profibus_lies_between_its_ends_and_the_ends_are_simulated(
     st.booleans(),
     st.sampled_from([0.0, 250.0, 500.0]),
 )
-@example("dynamixel-2", 1000.0, 6, 0, 4, 1, True, 250.0, 1000.0)
-@example("feetech", 1000.0, 6, 6, 0, 2, True, 250.0, 1000.0)
+@example("dynamixel-2", 1000.0, 6, 0, 4, 1, True, 250.0)
+@example("feetech", 1000.0, 6, 6, 0, 2, True, 250.0)
 def test_servos_are_those_of_the_simulation(
     protocol: str,
     rate: float,

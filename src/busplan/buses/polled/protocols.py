@@ -123,7 +123,7 @@ def protocol_of(bus: Any) -> ProtocolFigures:
     return _shipped(bus.protocol) if isinstance(bus.protocol, str) else ProtocolFigures(**vars(bus.protocol))
 
 
-ADAPTERS: Final = tuple(c.by_key("ADAPTER_TIMER_US"))
+ADAPTERS: Final = tuple(name.split("[")[1][:-1] for name in c if name.startswith("ADAPTER_TIMER_US["))
 """Names of the usual adapters of a host."""
 NO_ADAPTER: Final = "none"
 

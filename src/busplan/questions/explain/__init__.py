@@ -110,7 +110,7 @@ def explain(
     >>> import busplan
     >>> (explanation,) = busplan.explain("paper-4ms", "required_us").derivations
     >>> explanation.steps[-1].formula
-    'CTS + arbitration + data + acknowledge + execution + worst extra + idle + host + retries + T_npd'
+    'J + CTS + arbitration + data + acknowledge + execution + worst extra + idle + host + retries + T_npd'
     >>> round(explanation.value, 3), explanation.weakest_grade
     (263.32, 'recalled')
     >>> busplan.explain("paper-4ms").assumptions[0].grade
