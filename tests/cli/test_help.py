@@ -13,6 +13,7 @@ from unittest import mock
 import pytest
 from typer.main import get_command
 
+from busplan.buses.hosts import hosts
 from busplan.cli import app
 from busplan.cli.lazy import FAILURES
 from tests.registers import COMMANDS
@@ -169,3 +170,9 @@ def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str)
         assert len(offers) == len(flags)
         if shell == "fish":
             assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)
+
+
+def test_init_names_all_hosts_with_their_meanings() -> None:
+    here = context("init")
+    (host,) = (param for param in here.command.get_params(here) if param.name == "host")
+    assert ", ".join(f"{name} ({one.meaning})" for name, one in hosts().items()) in host.help

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from operator import abs as distance
+from operator import neg, pos
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 from busplan.english import told_apart
@@ -146,6 +148,8 @@ SURE: Final = 3.29 / 2
 """Least excess over the plan, in expanded uncertainties (k = 2), that is outside: k = 3.29, 99.9 % of normal errors."""
 Sense = Literal["equal", "at most", "at least", "shown"]
 """Comparison that the recorded figure must pass against the planned one; shown: nothing is planned."""
+_EXCESS: Final[Mapping[Sense, Callable[[Any], Any]]] = {"equal": distance, "at least": neg}
+"""Excess over the plan of a residual, a number or an array; of other senses the residual."""
 RecordedVerdict = Literal["within", "not shown", "outside"]
 """within: the plan is kept. not shown: the excess may be error, or the recording hides it. outside: surely not kept."""
 
@@ -191,12 +195,8 @@ class RecordedFigure(NamedTuple):
         """Excess over the plan: the distance for "equal", else negative within; None where nothing is planned."""
         if self.residual is None or self.sense == "shown":
             return None
-        beyond: float = self._beyond(self.residual)
+        beyond: float = _EXCESS.get(self.sense, pos)(self.residual)
         return beyond
-
-    def _beyond(self, residual: Any) -> Any:
-        """Excess over the plan of a number, or of an array."""
-        return {"equal": abs(residual), "at least": -residual}.get(self.sense, residual)
 
     @property
     def _most(self) -> float:
@@ -242,7 +242,7 @@ class RecordedFigure(NamedTuple):
         """
         if not len(events.values):
             return self
-        beyond = self._beyond(events.values - (self.planned or 0.0))
+        beyond = _EXCESS.get(self.sense, pos)(events.values - (self.planned or 0.0))
         is_worst = beyond == beyond.max()
         worst = events.earliest(is_worst)
         chosen = beyond > (self._most if self.verdict == "outside" else self._rounding)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 import typer
 
 from busplan.buses import kind_called, kind_named, kind_names, variant_called
-from busplan.buses.hosts import hosts
 from busplan.cli.command import command
 from busplan.cli.options import complete_kind, complete_profile, time_us
 from busplan.cli.output import message_width, say
@@ -86,7 +85,9 @@ def init_command(
         typer.Option(
             metavar="HOST",
             help="Host, with the assumed times of its own and of its latest wake-up, as others measured them: "
-            f"{', '.join(f'{name} ({host.meaning})' for name, host in hosts().items())}. Not every bus knows each."
+            "hardware (a master in hardware or a kernel driver of its own), tuned (a tuned Linux with its own driver), "
+            "real-time (PREEMPT_RT with a stock driver), low-latency (Linux with a low-latency kernel), stock (stock "
+            "Linux or Windows). Not every bus knows each."
             "  [default: tuned on EtherCAT, else not said]",
         ),
     ] = None,

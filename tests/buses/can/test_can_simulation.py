@@ -260,8 +260,6 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
     if random.random() < 0.4:  # some that block, seldom
         messages += (Message(f"low{number}", 0x7F0 + number, 8, 50_000) for number in range(3))
     sizes = random.choice([1, 4, 8, 8, 10, 16]), random.choice([1, 4, 8, 8, 10, 16])
-    if random.random() < 0.2:  # nodes that are only read, or only written
-        sizes = random.choice([(sizes[0], 0), (0, sizes[1])])
     return Traffic(
         (Group(sizes, (0x181, random.choice([0x201, 0x201, 0x120])), nodes),),
         tuple(messages),
@@ -340,6 +338,13 @@ def of_late_syncs(sent: Traffic, random: Random) -> Traffic:
     return (kind(sent, random) if kind else sent)._replace(sync_jitter_us=random.choice([1, 50, 200, 400, 900]))
 
 
+def of_one_way(sent: Traffic, random: Random) -> Traffic:
+    """Traffic of any sort with nodes that are only read, or only written."""
+    read, written = sent.groups[0].sizes
+    first = sent.groups[0]._replace(sizes=random.choice([(read, 0), (0, written)]))
+    return sent._replace(groups=(first, *sent.groups[1:]))
+
+
 def of_adapter(sent: Traffic, random: Random) -> Traffic:
     """Traffic of any sort whose host has an adapter."""
     kind = random.choice([of_both_formats, of_fd, of_rates, of_bursts, of_errors, of_queues, of_late_syncs, None])
@@ -369,6 +374,7 @@ KINDS: Final = {
     "queues": of_queues,
     "late SYNCs": of_late_syncs,
     "adapter": of_adapter,
+    "one way": of_one_way,
 }
 """What may become of random traffic of 11 bits."""
 

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial, reduce
 from itertools import product, repeat
-from math import ceil
+from math import ceil, inf
 from typing import Final
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, Premise, Run, summed
@@ -30,7 +30,7 @@ from busplan.buses.ieee1394.transactions import (
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, is_off, larger, named, rounded_down, smaller, step, total
+from busplan.elementwise import Number, choose, is_everywhere, is_off, larger, named, rounded_down, smaller, step, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 _PHASES: Final = by_key(LATENCY)
@@ -425,18 +425,20 @@ class Ieee1394Cycle(CycleWithStarts):
         return Phases(*(reduce(larger, column) for column in columns))
 
     def published_nodes(self) -> Number | None:
-        """Number of nodes by equation (11) [1]; None where nodes differ."""
+        """Number of nodes by equation (11) [1]; None where nodes differ or data go one way alone."""
         network = self.network
         if not network.is_uniform or not all(map(network.groups[0].has, TRANSACTION_KINDS)):
             return None
         read, write = self.longest("read"), self.longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
-        return equations.published_nodes(
+        nodes = equations.published_nodes(
             named(given_us, AVAILABLE.key, AVAILABLE.symbol),
             sync_us=self.sync_us,
             latency_us=(read.latency_us + write.latency_us) / 2,
             gaps_us=self.delays.gaps.both_us,
         )
+        has_both: Number = smaller(network.groups[0].read_bytes, network.groups[0].write_bytes) > 0
+        return nodes if is_everywhere(has_both) else choose(has_both, nodes, inf)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """Latencies of a read and of a write, with the farthest node of each group."""

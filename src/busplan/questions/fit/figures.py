@@ -151,8 +151,11 @@ class CycleFigures(FitFigures):
     @property
     def waits_us(self) -> dict[Wait, float]:
         """What the cycle waits for, and how long [us]: wire, nodes, adapter, host; all add up to `required_us`."""
-        waits = {figure.key: figure.waits_for for figure in self.bus_figures.terms}
-        return {wait: sum(term.us for term in self.terms if waits[term.key] == wait) for wait in WAITS}
+        waits_for = {figure.key: figure.waits_for for figure in self.bus_figures.terms}
+        waits_us = dict.fromkeys(WAITS, 0.0)
+        for term in self.terms:
+            waits_us[waits_for[term.key]] += term.us
+        return waits_us
 
     @classmethod
     def of(cls, figures: FitFigures) -> Self:

@@ -95,7 +95,7 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
             override(profile, {key: 1}, origin={key: name})  # says what was meant
         except BusplanError as error:
             raise ArgumentError(*error.problems) from None
-        raise ArgumentError(f"{name}: no such key of this profile")
+        raise ArgumentError(f"{name}: the profile has no table {key.rpartition('.')[0]}; add it first")
     if isinstance(keys[key].value, list | tuple):
         raise ArgumentError(f"{name}: is a list; expected the key of one number")
 
