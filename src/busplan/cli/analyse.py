@@ -325,7 +325,7 @@ def explain_command(
     "It holds for all profiles, as --period does.",
     of="profiles",
     period="one",
-    reads=lambda profiles, **_: profile_files(*profiles),
+    reads=lambda profiles, recording, **_: (*profile_files(*profiles), *([recording] if recording else [])),
     has_all=False,
     default="html",
     names_changes=True,
@@ -353,6 +353,17 @@ def report_command(
             help="Run the circle test of profiles that ask for one.  [default: where servo values are measured]"
         ),
     ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A recording of the machine of the one profile, as `measured` takes it: compared with the plan, "
+            "with its longest cycle.  [default: none]",
+        ),
+    ] = None,
+    channel: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
+    ] = None,
 ) -> "Answer":
     """Put the answers for a profile on one page, for a screen, a machine's file or a repository.
 
@@ -371,11 +382,14 @@ def report_command(
             f"{call.form_typed}: a page holds many tables; each names its command, and that command's --format csv "
             "has its rows"
         )
+    require_company("--recording FILE", {"--channel": channel}, is_given=recording is not None)
     with progress_bar("circle tests") as progress:
         return busplan.report(
             load_each(profiles, lambda argument: Call(argument, call.changes).profile),
             title=title,
             circle=circle,
+            recording=recording,
+            channel=channel,
             progress=progress,
             # The page names the changes itself, for they stand in its commands, too.
             origins=[(argument, call.changes) for argument in profiles],

@@ -7,6 +7,7 @@ from functools import cache
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -231,3 +232,17 @@ def test_a_warning_looks_like_one_in_a_card_of_what_passes() -> None:
     card = page.partition('<div class="judged passes">')[2].partition("</div>\n</div>")[0]
     assert '<dd class="warns">not shown to fit while it leaves bus.gap_count = 63</dd>' in card
     assert re.search(r"\.lines p\.warns[^{]*\{[^}]*border-left", page)
+
+
+def test_a_recording_stands_beside_the_plan_of_its_machine(tmp_path: Path) -> None:
+    path = tmp_path / "machine 1.log"
+    busplan.emulate("can-servo-8", cycles=30).save(path)
+    page = busplan.report("can-servo-8", recording=path)
+    (profile,) = page.to_dict()["profiles"]
+    beside, cycle = profile["answers"]["measured"], profile["answers"]["recorded_cycle"]
+    assert beside["figures"] == busplan.measured("can-servo-8", path).to_dict()["figures"]
+    assert cycle == busplan.timeline("can-servo-8", recording=path).to_dict()
+    sections = {section.key: section.command for section in page.profiles[0].sections}
+    assert sections["recorded_cycle"] == f"busplan timeline can-servo-8 --recording '{path}'"
+    with pytest.raises(busplan.BusplanError, match="recording: belongs to one profile, and there are 2"):
+        busplan.report(["can-servo-8", "canopen-6"], recording=path)

@@ -3,7 +3,8 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from functools import partial
+from typing import Final, TypeAlias
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, PERIOD, SAFE_AXES, UNCERTAINTY, UTILISATION, VERDICT
 from busplan.english import has_controls, plural
@@ -29,7 +30,7 @@ from busplan.forms.blocks import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges, change_options, shell_word
 from busplan.progress import Progress, part_of
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.arguments import Origin, ProfileLike, load_profile, one_or_several, origin_of
+from busplan.questions.base.arguments import FilePath, Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.base.sentences import changed_report, document
 from busplan.questions.capacity import capacity
 from busplan.questions.capacity.sensitivity import MOST_GROUPS
@@ -40,6 +41,7 @@ from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.network import network_of
 from busplan.questions.latency import latency
 from busplan.questions.map import map_
+from busplan.questions.measured import measured
 from busplan.questions.timeline import timeline
 from busplan.sections.profile import Profile
 from busplan.sourced import constants_changed
@@ -196,6 +198,8 @@ def report(
     *,
     title: str | None = None,
     circle: bool | None = None,
+    recording: FilePath | None = None,
+    channel: str | None = None,
     progress: Progress | None = None,
     origins: Iterable[Origin] | None = None,
 ) -> ReportAnswer:
@@ -210,6 +214,11 @@ def report(
         Heading of the page; by default the profile's name, or how many profiles.
     circle
         Run the circle test; by default of profiles whose servo values are measured.
+    recording
+        A recording of the machine of a single profile, as for `measured`: the page compares it with the plan, and shows
+        its longest cycle.
+    channel
+        Channel of a CAN log; by default the only one.
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
     origins
@@ -225,7 +234,8 @@ def report(
     Raises
     ------
     BusplanError
-        Not a profile, a title that is no words in one line, or not an origin for each profile.
+        Not a profile, a title that is no words in one line, not an origin for each profile, or not a recording of the
+        one profile.
 
     Examples
     --------
@@ -246,6 +256,8 @@ def report(
             origin_of(profile) if isinstance(profile, Profile) else (os.fspath(profile), NO_CHANGES)
             for profile in given
         ]
+    if recording is not None and len(given) > 1:
+        raise ArgumentError(f"recording: belongs to one profile, and there are {len(given)}")
     named = list(origins)
     if len(named) != len(given):
         raise BusplanError(f"origins: {len(named)} for {plural(len(given), 'profile')}; expected one for each")
@@ -253,54 +265,101 @@ def report(
     for number, ((argument, changes), profile) in enumerate(zip(named, loaded, strict=True)):
         part = None if progress is None else part_of(progress, number=number, of=len(loaded))
         with constants_changed(profile.constants):
-            reported.append(_reported(profile, argument, changes, circle=circle, progress=part))
+            recorded = None if recording is None else (recording, channel)
+            reported.append(_reported(profile, argument, changes, circle=circle, recorded=recorded, progress=part))
     return ReportAnswer(tuple(reported), title)
 
 
+_Recording: TypeAlias = tuple[FilePath, str | None]
+"""A recording, and its channel."""
+
+
 def _reported(
-    profile: Profile, argument: str, changes: KeyChanges, *, circle: bool | None, progress: Progress | None
+    profile: Profile,
+    argument: str,
+    changes: KeyChanges,
+    *,
+    circle: bool | None,
+    recorded: _Recording | None,
+    progress: Progress | None,
 ) -> ReportedProfile:
-    options = [*change_options(changes, period_us=profile.cycle.period_us)]
-
-    def command(name: str, *more: str, takes_period: bool = True) -> str:
-        # The list of explain takes no --period.
-        without = KeyChanges(tuple(change for change in changes.entries if change.option != "--period"))
-        words = options if takes_period else [*change_options(without, period_us=0.0)]
-        return " ".join(("busplan", name, shell_word(argument), *more, *words))
-
     is_varied = profile.has_cycle and len(profile.node_groups) <= MOST_GROUPS
-    bus, more = capacity(profile, sensitivity=is_varied), ("--sensitivity",) if is_varied else ()
-    is_left_out = profile.has_cycle and not is_varied
-    missing = [f"What moves the margin is not shown: it is for up to {MOST_GROUPS} groups."] if is_left_out else []
+    bus, made = capacity(profile, sensitivity=is_varied), _Sections(profile, argument, changes)
+    if profile.has_cycle and not is_varied:
+        made.missing.append(f"What moves the margin is not shown: it is for up to {MOST_GROUPS} groups.")
+    of_bus = made.command("capacity", *(("--sensitivity",) if is_varied else ()))
+    answers = (
+        PageSection("capacity", "Every figure of the cycle", of_bus, bus.report()),
+        *made.of_plan(),
+        *(made.of_recording(*recorded) if recorded else ()),
+        *(made.of_circle(progress) if _asks_for_circle(profile, circle) else ()),
+        made.of_inputs(),
+    )
+    return ReportedProfile(argument, changes, profile, bus.verdicts[0], answers, tuple(made.missing))
 
-    def drawn(name: str, title: str, question: Callable[[Profile], Answer]) -> Iterator[PageSection]:
-        try:
-            answer = question(profile).report()
-        except BusplanError as error:  # more groups or nodes than can be drawn
-            missing.append(f"The {name} is not drawn: {error}.")
-        else:
-            yield PageSection(name, title, command(name), answer)
 
-    def sections() -> Iterator[PageSection]:
-        yield PageSection("capacity", "Every figure of the cycle", command("capacity", *more), bus.report())
-        if profile.has_cycle:
-            yield from drawn("map", "What fits, and what limits it", map_)
-        latencies = latency(profile).report()
-        yield PageSection("latency", "Delay of data", command("latency"), latencies)
-        if profile.has_cycle:
-            yield from drawn("timeline", "The cycle to scale", timeline)
-        if _asks_for_circle(profile, circle):
-            if refused := _circle_refused(profile):
-                missing.append(f"The circle test cannot be run: {refused}.")
-            else:
-                test = circle_test(profile, contributions=True, progress=progress).report()
-                yield PageSection("circle", "The circle", command("circle-test", "--contributions"), test)
-        yield PageSection(
-            "explain", "What it rests on", command("explain", takes_period=False), explain(profile).report()
+class _Sections:
+    """The answers for a profile, each with its command."""
+
+    def __init__(self, profile: Profile, argument: str, changes: KeyChanges) -> None:
+        self.profile, self.argument, self.changes = profile, argument, changes
+        self.missing: list[str] = []
+        """Why an answer is not there."""
+
+    def command(self, name: str, *more: str, takes_period: bool = True) -> str:
+        """A command with the changes of the profile."""
+        changes, period_us = self.changes, self.profile.cycle.period_us
+        if not takes_period:
+            changes = KeyChanges(tuple(change for change in changes.entries if change.option != "--period"))
+        return " ".join(
+            ("busplan", name, shell_word(self.argument), *more, *change_options(changes, period_us=period_us))
         )
 
-    answers = tuple(sections())
-    return ReportedProfile(argument, changes, profile, bus.verdicts[0], answers, tuple(missing))
+    def drawn(
+        self, name: str, title: str, command: str, question: Callable[[Profile], Answer]
+    ) -> Iterator[PageSection]:
+        """An answer that may not be possible, with more groups or nodes than can be drawn, or without a whole cycle."""
+        try:
+            answer = question(self.profile).report()
+        except BusplanError as error:
+            self.missing.append(f"The {name} is not drawn: {error}.")
+        else:
+            yield PageSection(name.replace(" ", "_"), title, command, answer)
+
+    def of_plan(self) -> Iterator[PageSection]:
+        """Map, latencies and timeline."""
+        has_cycle = self.profile.has_cycle
+        if has_cycle:
+            yield from self.drawn("map", "What fits, and what limits it", self.command("map"), map_)
+        yield PageSection("latency", "Delay of data", self.command("latency"), latency(self.profile).report())
+        if has_cycle:
+            yield from self.drawn("timeline", "The cycle to scale", self.command("timeline"), timeline)
+
+    def of_recording(self, path: FilePath, channel: str | None) -> Iterator[PageSection]:
+        """A recording beside the plan, and its longest cycle."""
+        file, on = shell_word(os.fspath(path)), () if channel is None else ("--channel", shell_word(channel))
+        beside = measured(self.profile, path, channel=channel).report()
+        yield PageSection("measured", "A recording beside the plan", self.command("measured", file, *on), beside)
+        if self.profile.has_cycle:
+            title, command = (
+                "Where the time of a recorded cycle went",
+                self.command("timeline", "--recording", file, *on),
+            )
+            yield from self.drawn("recorded cycle", title, command, partial(timeline, recording=path, channel=channel))
+
+    def of_circle(self, progress: Progress | None) -> Iterator[PageSection]:
+        """The circle test, where it can be run."""
+        if refused := _circle_refused(self.profile):
+            self.missing.append(f"The circle test cannot be run: {refused}.")
+            return
+        test = circle_test(self.profile, contributions=True, progress=progress).report()
+        yield PageSection("circle", "The circle", self.command("circle-test", "--contributions"), test)
+
+    def of_inputs(self) -> PageSection:
+        """What the verdict rests on."""
+        # The list of explain takes no --period.
+        command = self.command("explain", takes_period=False)
+        return PageSection("explain", "What it rests on", command, explain(self.profile).report())
 
 
 def _asks_for_circle(profile: Profile, circle: bool | None) -> bool:
