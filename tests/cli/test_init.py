@@ -357,6 +357,14 @@ def test_servos_of_a_robot_have_one_axis_their_own_data_and_no_circle(run: Run, 
         assert "return_delay_us" not in data["bus"]
 
 
+def test_motors_of_a_robot_have_one_axis_and_a_frame_each_way(run: Run, tmp_path: Path) -> None:
+    run("init", "arm", "--bus", "can-motors", "--axes", 6, cwd=tmp_path)
+    data = tomllib.loads((tmp_path / "arm.toml").read_text(encoding="utf-8"))
+    assert (data["bus"]["nodes"], data["node"]["axes"]) == (6, 1)
+    assert (data["payload"]["read_bytes"], data["payload"]["write_bytes"]) == (8, 8)
+    assert not data.keys() & {"circle", "servo", "tolerance", "mechanics"}
+
+
 def test_axes_alone_get_the_nodes_that_they_need(run: Run, tmp_path: Path) -> None:
     run("init", "press", "--axes", 6, cwd=tmp_path)
     data = tomllib.loads((tmp_path / "press.toml").read_text(encoding="utf-8"))

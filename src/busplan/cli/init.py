@@ -58,7 +58,7 @@ def init_command(
     axes: Annotated[
         int | None,
         typer.Option(
-            metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node, 1 for each servo]"
+            metavar="N", min=1, help="Axes of the whole machine.  [default: 4 for each node, 1 for each servo or motor]"
         ),
     ] = None,
     group: Annotated[

@@ -506,3 +506,13 @@ def test_usual_bit_rates_have_a_grade_and_a_source_and_are_ones_of_the_protocol(
         assert rates["grade"] in get_args(Grade)
         assert rates["source"]
         assert max(rates["kbit_s"]) <= constants.by_key(table).get("MAX_BIT_RATE_KBIT_S", 1e9), table
+
+
+def test_a_length_field_of_16_bits_bounds_the_data_of_a_servo() -> None:
+    # The field counts instruction, error and CRC, too: 4 bytes.
+    limits = [
+        busplan.capacity(busplan.load_profile("dynamixel-arm-14", changes={"payload.read_bytes": size})).verdicts[0]
+        for size in (65_531, 65_532)
+    ]
+    said = [str(verdict.card.lines) for verdict in limits]
+    assert ["over 65531" in words for words in said] == [False, True]

@@ -302,3 +302,10 @@ def test_every_form_has_the_lines_of_the_card() -> None:
     assert '<p class="answer">DOES NOT FIT</p>' in answer.html
     assert '<rect class="used fails" x="0.000%" y="0" width="' in answer.html
     assert "| short by | 20 us, +/- 6 |" in busplan.forms.render(answer.report(), "markdown")
+
+
+@pytest.mark.parametrize("name", ["paper-4ms", "dynamixel-arm-14", "ethercat-servo-8", "can-servo-8"])
+def test_what_a_cycle_waits_for_adds_up_to_what_is_used(name: str) -> None:
+    _, lines = card_of(busplan.capacity(name))
+    used_us = float(lines["used"].split(" us of")[0].split()[-1])
+    assert sum(map(float, re.findall(r"([\d.]+) us", lines["waits for"]))) == pytest.approx(used_us, rel=0.005)

@@ -28,7 +28,7 @@ def test_the_verdict_names_margin_term_limit_and_change() -> None:
         "fastest period": "553 us; 433 us with bus.gap_count = 7",
         "cure": "bus.gap_count = 7, which leaves 46 us",
         "buses": "2 such buses, of 1 node or fewer",
-        "waits for": "wire 116 us, nodes 147 us",
+        "waits for": "wire 116 us, nodes 147 us; correction 7 us",
         "largest term": "execution, 147 us",
         "largest doubt": "execution time, +/- 5 us",
         "rests on": "an instant host, cycles without jitter and 4 more",

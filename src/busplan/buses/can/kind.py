@@ -64,6 +64,12 @@ kind = "can"
 bit_rate_kbit_s = 1000     # assumed: most robot motors
 access = "polled"          # a command, its answer, the next motor; "burst": all commands at once
 host_us = 20               # assumed: the host's time for each command; measure it"""
+_MOTORS_EXECUTION: Final = """\
+kind = "linear"
+grade = "assumed"          # between 0 and twice its value
+base_us = 150              # assumed: from a command to the queued answer; a CyberGear answers within 250 us
+per_byte_us = 0
+"""
 
 
 class Can(Bus):
@@ -91,12 +97,14 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
 pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in the same one, in bus.host_us""",
         period="10ms",
         slice_ratio="1            # assumed: the whole period is for communication",
-        measure="measure both on a node: SYNC to its frame, command to effect",
+        measure="measure both on a node: SYNC, or its command, to its frame; command to effect",
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
         variants={
             "can-fd": "data_bit_rate_kbit_s = 2000 # assumed: transceivers and cable decide, up to 8000",
             "can-motors": _MOTORS,
         },
+        servos={"can-motors": {"read": (8, "one frame of position, velocity and torque"), "write": (8, "one frame")}},
+        tables={"can-motors": _MOTORS_EXECUTION},
         without_wake_up=("can-motors",),
         rate="bit_rate_kbit_s",
         more="""\

@@ -406,7 +406,10 @@ def _basis(verdict: Verdict, tested: Tested) -> Iterator[_Line]:
 def _largest(cycle: CycleFigures) -> Iterator[_Line]:
     """What a cycle waits for, its largest term and its largest doubt."""
     waits = (f"{wait} {known_text(us, cycle.uncertainty_us)} us" for wait, us in cycle.waits_us.items() if us)
-    yield "waits for", blocks.Sentence((", ".join(waits),))
+    # What is used has the correction, too.
+    bias = known_text(cycle.bias_us or 0.0, cycle.uncertainty_us)
+    rest = f"; correction {bias} us" if float(bias) else ""
+    yield "waits for", blocks.Sentence((", ".join(waits) + rest,))
     term = max(cycle.terms, key=lambda term: term.us)
     us = known_text(term.us, cycle.uncertainty_us)
     yield "largest term", blocks.Sentence((f"{cycle.bus_figures.term_label(term.name)}, {us} us",))

@@ -323,7 +323,10 @@ def _payloads(now: AtPeriod, kept: Collection[str]) -> Iterator[Changes]:
     cuts = [_cut(group, kind) for group, kind in product(profile.node_groups, TRANSACTION_KINDS)]
     step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
     most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
-    sizes = [size for size in range(step, most + 1, step) if _cut_to(profile, size, kept)]
+    sizes = range(step, most + 1, step)
+    # Too small sizes cannot be cut to, large ones cut nothing.
+    first = bisect_left(sizes, x=True, key=lambda size: _cut_to(profile, size, kept) is not None)
+    sizes = sizes[first : bisect_left(sizes, x=True, key=lambda size: _cut_to(profile, size, kept) == {})]
     # No more bytes are needed where fewer are not enough, but where a table of execution times falls.
     fits = bisect_left(sizes, x=True, key=lambda size: not now.holds(_cut_to(profile, size, kept)))
     yield from (
