@@ -178,7 +178,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
         with path.open("rb") as file:
             reader: Any
             if name is None:
-                reader = can.CanutilsLogReader(cast("Any", _CandumpText(path, file)))
+                reader = _candump(_CandumpText(path, file))
             elif name == "BLFReader":
                 reader = _bounded_blf()(file)
             else:
@@ -219,6 +219,7 @@ class _CandumpText(_Lines):
         self._path = path
         self._has_begun = self._is_error = False
         self._last = "(0.0) can"
+        self.channel = ""
         """Stamp and channel of the last frame, for an error frame without them."""
 
     def __iter__(self) -> Iterator[str]:
@@ -248,12 +249,23 @@ class _CandumpText(_Lines):
             mark = f"##{int(match['switch'] == 'B')}" if is_fd else "#"
             content = f"R{match['size']}" if data.startswith("r") else data
             frame = f"{match['identifier']}{mark}{content}"
-        self._last = f"({match['stamp']}) {match['channel']}"
+        self.channel = match["channel"]
+        self._last = f"({match['stamp']}) {self.channel}"
         identifier = frame.partition("#")[0]
         # python-can takes for an error frame one with the flag of a bus error alone.
         if len(identifier) == _EXTENDED_DIGITS and int(identifier, 16) & _ERROR_FLAG:
             frame = f"{_ERROR_FRAME}#"
         return f"{self._last} {frame}"
+
+
+def _candump(text: _CandumpText) -> Iterator[Any]:
+    """Messages of a text; python-can gives error frames no channel."""
+    import can  # noqa: PLC0415 - an extra
+
+    for message in can.CanutilsLogReader(cast("Any", text)):
+        if message.is_error_frame:
+            message.channel = text.channel
+        yield message
 
 
 class _CapturedFrame(NamedTuple):
@@ -369,7 +381,7 @@ class _Log:
                 raise _DamageError(f"it has more than {_MOST_FRAMES:,} frames; give a part of it")
             is_other = self._channel not in (None, str(message.channel))
             if message.is_error_frame:
-                if is_other:
+                if is_other and message.channel is not None:
                     continue
                 self._errors += _ERROR_ROW.pack(message.timestamp if has_stamp else nan, number)
                 continue
