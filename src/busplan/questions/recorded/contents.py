@@ -231,7 +231,8 @@ class _Log:
         none: _Ends = (None, None)
         gap: _Ends = none if widest is None else self._at(int(stretch.taken[widest + 1]))
         first_error, last_error = (self._error(place) if frames.errors else none for place in (0, -1))
-        possible = {} if self.rate else {rate: self._fullest(self._wire(rate, self.data_rate).us) for rate in self.possible}
+        rates = () if self.rate else self.possible
+        possible = {rate: self._fullest(self._wire(rate, self.data_rate).us) for rate in rates}
         return LogContents(
             day_of(int(frames.start_s * 1e9)),
             len(stretch.taken),
