@@ -116,6 +116,32 @@ def test_an_identifier_that_has_no_room_in_its_bits_is_damage(word: str, is_dama
     assert is_damage or identifier in unplanned.note
 
 
+EXPLAINED = """\
+ (1.000000)  can0  181   [2]  01 02
+ (1.001000)  can0  20000004   [8]  00 04 00 00 00 00 60 00   ERRORFRAME
+\tcontroller-problem{rx-error-warning}
+\terror-counter-tx-rx{{96}{0}}
+ (1.002000)  can0  181   [2]  01 02
+"""
+LOGGED_ERRORS = """\
+(1.000000) can0 181#0102
+(1.001000) can0 20000004#0004000000006000
+(1.001500) can1 20000088#0000000000000000
+(1.001700) can1 181#0102
+(1.002000) can0 181#0102
+"""
+
+
+@pytest.mark.parametrize("text", [EXPLAINED, LOGGED_ERRORS], ids=["in words", "of two channels"])
+def test_every_error_frame_of_the_channel_is_one_and_no_damage(text: str, tmp_path: Path) -> None:
+    (tmp_path / "bus.log").write_text(text)
+    answer = busplan.measured("can-servo-8", tmp_path / "bus.log", channel="can0")
+    recorded = {figure.quantity: figure for figure in answer.figures}
+    assert (recorded["error frames"].recorded, recorded["error frames"].first_frame) == (1, 2)
+    assert recorded["frames of no message of the plan"].recorded == 0
+    assert broken(answer) == ""
+
+
 @cache
 def log(ending: str, folder: str) -> bytes:
     path = Path(folder, f"whole.{ending}")

@@ -54,7 +54,10 @@ class Emulation:
         if fault.name not in self.faults:
             return frozenset()
         number = int(self.faults[fault.name]) if fault.unit == "1" else TIMES
-        free = [cycle for cycle in among if cycle >= _FIRST and cycle not in self._hit]
+        possible = [*among]
+        if not possible:
+            raise ArgumentError(f"fault {fault.name}: no cycle of this plan may have it")
+        free = [cycle for cycle in possible if cycle >= _FIRST and cycle not in self._hit]
         if number > len(free) // _ONE_OF:
             why = f"of {len(free):,} cycles that may have it, it takes a quarter at most; give more cycles"
             raise ArgumentError(f"fault {fault.name}: {number:,} times; {why}")

@@ -51,6 +51,8 @@ _LINE: Final = re.compile(
 """Line of `candump -l`, or of candump's output on a terminal."""
 _CLASSICAL_SIZE: Final = 1
 """Digits of a classical frame's size on a terminal; an FD frame has two."""
+_EXTENDED_DIGITS: Final = 8
+"""Digits of an identifier with 29 bits and flags."""
 _ERROR_FRAME: Final = "20000080"
 """Identifier of an error frame in `candump -l`."""
 _PACKET: Final = Struct(">IBB2x")
@@ -176,7 +178,7 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
         with path.open("rb") as file:
             reader: Any
             if name is None:
-                reader = can.CanutilsLogReader(cast("Any", _CandumpText(path, file)))
+                reader = _candump(_CandumpText(path, file))
             elif name == "BLFReader":
                 reader = _bounded_blf()(file)
             else:
@@ -215,15 +217,20 @@ class _CandumpText(_Lines):
     def __init__(self, path: Path, file: BinaryIO) -> None:
         super().__init__(file)
         self._path = path
-        self._has_begun = False
+        self._has_begun = self._is_error = False
         self._last = "(0.0) can"
+        self.channel = ""
         """Stamp and channel of the last frame, for an error frame without them."""
 
     def __iter__(self) -> Iterator[str]:
         for number, content in enumerate(super().__iter__(), start=1):
             line = content.strip()
-            if line and not line.startswith("#"):
-                yield self._frame(line, number)
+            if not line or line.startswith("#") or (self._is_error and content.startswith("\t")):
+                # The last: `candump -e` writes in words what an error frame says.
+                continue
+            frame = self._frame(line, number)
+            self._is_error = frame.endswith(f" {_ERROR_FRAME}#")
+            yield frame
 
     def _frame(self, line: str, number: int) -> str:
         match = _LINE.fullmatch(line)
@@ -242,8 +249,23 @@ class _CandumpText(_Lines):
             mark = f"##{int(match['switch'] == 'B')}" if is_fd else "#"
             content = f"R{match['size']}" if data.startswith("r") else data
             frame = f"{match['identifier']}{mark}{content}"
-        self._last = f"({match['stamp']}) {match['channel']}"
+        self.channel = match["channel"]
+        self._last = f"({match['stamp']}) {self.channel}"
+        identifier = frame.partition("#")[0]
+        # python-can takes for an error frame one with the flag of a bus error alone.
+        if len(identifier) == _EXTENDED_DIGITS and int(identifier, 16) & _ERROR_FLAG:
+            frame = f"{_ERROR_FRAME}#"
         return f"{self._last} {frame}"
+
+
+def _candump(text: _CandumpText) -> Iterator[Any]:
+    """Messages of a text; python-can gives error frames no channel."""
+    import can  # noqa: PLC0415 - an extra
+
+    for message in can.CanutilsLogReader(cast("Any", text)):
+        if message.is_error_frame:
+            message.channel = text.channel
+        yield message
 
 
 class _CapturedFrame(NamedTuple):
@@ -357,7 +379,10 @@ class _Log:
                 self.start_s = message.timestamp
             if max(len(self._rows) // _ROW.size, len(self._errors) // _ERROR_ROW.size) >= _MOST_FRAMES:
                 raise _DamageError(f"it has more than {_MOST_FRAMES:,} frames; give a part of it")
+            is_other = self._channel not in (None, str(message.channel))
             if message.is_error_frame:
+                if is_other and message.channel is not None:
+                    continue
                 self._errors += _ERROR_ROW.pack(message.timestamp if has_stamp else nan, number)
                 continue
             _require_frame(message, last_s)
@@ -365,7 +390,7 @@ class _Log:
             self._channels[message.channel] += 1
             if len(self._channels) > _MOST_CHANNELS:
                 raise _DamageError(f"over {_MOST_CHANNELS} channels")
-            if self._channel not in (None, str(message.channel)):
+            if is_other:
                 continue
             is_fd = message.is_fd
             # CAN FD has no remote frames. One that a log marks so is a data frame whose data the log lost.

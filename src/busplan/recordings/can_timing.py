@@ -293,13 +293,16 @@ def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:
     return bool(near >= LEAST_EVENTS and near >= _SHARP * np.count_nonzero(rates >= _ABOUT * bit_rate_kbit_s))
 
 
-def late_stamps_us(frames: CanFrames, stretch: ClockStretch, bit_us: float) -> float:
-    """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us]."""
-    sent_us = np.concatenate(([0.0], frames.bits[stretch.taken].cumsum() * bit_us))
-    ahead_us = [wire_us - stretch.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
+def late_stamps_us(stretch: ClockStretch, wire_us: Floats) -> float:
+    """Time by which frames come closer than the bus sends them, stamped at their ends or at their starts [us].
+
+    `wire_us` is the least time of each frame of the stretch on the wire [us].
+    """
+    sent_us = np.concatenate(([0.0], wire_us.cumsum()))
+    ahead_us = [us - stretch.times_us for us in (sent_us[1:], sent_us[:-1])]
     late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
     # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
-    return late_us + float(frames.bits.max()) * bit_us if late_us > step_us(stretch) else late_us
+    return late_us + float(wire_us.max()) if late_us > step_us(stretch) else late_us
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:

@@ -182,3 +182,24 @@ def test_a_file_alone_is_a_log(run: Run, refused: Refused, tmp_path: Path) -> No
     )
     capture = Path(__file__).parents[1] / "measured" / "files" / "capture.pcapng"
     assert "a capture of EtherCAT needs its profile" in refused("measured", str(capture), cwd=tmp_path)
+
+
+def test_stamps_of_can_fd_are_late_where_frames_come_closer_than_the_bus_sends_them(run: Run, tmp_path: Path) -> None:
+    """Ten frames of 64 bytes in a row, all with the stamp of the last: at 1 and 5 Mbit/s each takes 135 us or more."""
+    frames = [f"{0x181 + number:X}##1{'00' * 64}" for number in range(10)]
+    lines = [f"({1_700_000_000 + cycle / 100:.6f}) can0 {frame}\n" for cycle in range(50) for frame in frames]
+    (tmp_path / "bus.log").write_text("".join(lines))
+    rates = ("--bit-rate", "1000", "--data-bit-rate", "5000")
+    found = json.loads(run("measured", "bus.log", *rates, "--format", "json", cwd=tmp_path).stdout)
+    assert 9 * 135 < found["late_stamps_us"] < 11 * 165
+
+
+def test_a_data_bit_rate_that_nobody_gave_makes_no_stamp_late(run: Run, tmp_path: Path) -> None:
+    run("emulate", "can-fd-motors-8", "--cycles", "50", "-o", "bus.log", cwd=tmp_path)
+    assert json.loads(run("measured", "bus.log", "--format", "json", cwd=tmp_path).stdout)["late_stamps_us"] == 0
+
+
+def test_a_fault_that_no_cycle_may_have_is_refused_as_that(run: Run, tmp_path: Path) -> None:
+    plan = ("can-servo-8", "--set", "payload.read_bytes=0")
+    done = run("emulate", *plan, "--fault", "missing-pdo", "-o", "bus.log", cwd=tmp_path)
+    assert (done.returncode, "no cycle of this plan may have it" in done.stderr) == (2, True)

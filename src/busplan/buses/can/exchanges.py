@@ -92,7 +92,7 @@ class RequestLog:
         """Largest error of a time from the end of one frame to the start of another [us]."""
         rates = {"bit_rate_kbit_s": self.traffic.bit_rate_kbit_s}
         rates["data_bit_rate_kbit_s"] = self.traffic.data_bit_rate_kbit_s
-        self.wire_us, worst_us, none_us = wire_times(frames, stretch.taken, **rates)
+        self.wire_us, worst_us, none_us, _ = wire_times(frames, stretch.taken, **rates)
         # The stuff bits of CAN FD are not known.
         unknown_us = (worst_us - none_us)[frames.is_fd[stretch.taken]] / 2
         self.error_us += float(unknown_us.max(initial=0.0))

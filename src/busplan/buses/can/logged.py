@@ -19,6 +19,8 @@ class WireTimes(NamedTuple):
     """With the most stuff bits [us]."""
     none_us: Floats
     """Without stuff bits [us]."""
+    least_us: Floats
+    """With its own stuff bits, of CAN FD without [us]."""
 
 
 def wire_times(
@@ -46,4 +48,4 @@ def wire_times(
     worst_us, none_us = each_us(is_stuffed=True), each_us(is_stuffed=False)
     # Of CAN FD the stuff bits are not known: any number of the possible ones.
     us = np.where(is_fd, (worst_us + none_us) / 2, frames.bits[taken] * bit_us(bit_rate_kbit_s))
-    return WireTimes(us, worst_us, none_us)
+    return WireTimes(us, worst_us, none_us, np.where(is_fd, none_us, us))

@@ -88,7 +88,12 @@ class _Log:
         self.messages = {message.name: message for message in network.profile.message}
         self.least_bit_rate = can_timing.least_bit_rate(frames, self.stretch)
         self.step_us = can_timing.step_us(self.stretch)
-        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(frames, self.stretch, self.bit_us)
+        rates = {
+            "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s,
+            "data_bit_rate_kbit_s": self.traffic.data_bit_rate_kbit_s,
+        }
+        wire_us = wire_times(frames, self.taken, **rates).least_us
+        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(self.stretch, wire_us)
         """Largest error of a stamp: the step of stamps, and what frames come closer than the bus allows [us]."""
 
     @property
@@ -163,7 +168,7 @@ class _Log:
         if count < 2 or span_us <= 0 or (is_fd.all() and not is_whole):  # noqa: PLR2004 - a distance
             return
         nominal, data = self.traffic.bit_rate_kbit_s, self.traffic.data_bit_rate_kbit_s
-        wire_us, worst_us, none_us = wire_times(
+        wire_us, worst_us, none_us, _ = wire_times(
             self.frames, self.taken, bit_rate_kbit_s=nominal, data_bit_rate_kbit_s=data
         )
         # The first frame ended with its stamp.

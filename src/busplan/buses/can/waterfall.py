@@ -9,7 +9,7 @@ import numpy as np
 
 from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
-from busplan.buses.can.equations import BASE_BITS, bit_us
+from busplan.buses.can.equations import BASE_BITS
 from busplan.buses.can.logged import wire_times
 from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, Senders, emergencies
 from busplan.buses.can.streams import Stream, streams
@@ -89,15 +89,15 @@ class _CanCycles(RecordedCycles):
                 "wire of the plan"
             )
         self.step_us = can_timing.step_us(stretch)
-        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(frames, stretch, bit_us(rate))
         wire = wire_times(
             frames, stretch.taken, bit_rate_kbit_s=rate, data_bit_rate_kbit_s=traffic.data_bit_rate_kbit_s
         )
+        self.stamp_error_us = self.step_us + can_timing.late_stamps_us(stretch, wire.least_us)
         self.wire_us = wire.us
         self.stuffing_us = np.where(frames.is_fd[stretch.taken], (wire.worst_us - wire.none_us) / 2, 0.0)
         # A frame ends before the next one begins: a stamp beyond that is late. Of the time since 1970 a float holds
         # whole microseconds.
-        sent_us = np.where(frames.is_fd[stretch.taken], wire.none_us, wire.us).cumsum()
+        sent_us = wire.least_us.cumsum()
         self.ends_us: Floats = np.minimum.accumulate((np.rint(stretch.times_us) - sent_us)[::-1])[::-1] + sent_us
         self.begin_us = float(stretch.times_us[0]) - frames.lead_us
         """Time of the first frame of the recording [us]."""

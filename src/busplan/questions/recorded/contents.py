@@ -9,8 +9,8 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from busplan.buses.can.equations import BASE_BITS, USUAL_DATA_BIT_RATE, bit_us
-from busplan.buses.can.logged import wire_times
+from busplan.buses.can.equations import BASE_BITS, MOST_DATA_BIT_RATE, USUAL_DATA_BIT_RATE
+from busplan.buses.can.logged import WireTimes, wire_times
 from busplan.buses.can.recorded_cycles import emergencies
 from busplan.buses.rule import day_of
 from busplan.english import plural
@@ -198,11 +198,14 @@ class _Log:
         self.is_data_given = data_bit_rate_kbit_s is not None
         self.data_rate = data_bit_rate_kbit_s or USUAL_DATA_BIT_RATE
         # The share of each identifier is the same at any bit rate, unless there are two.
-        self.wire_us = self._wire_us(self.rate or can_timing.MOST_BIT_RATE)
+        rate = self.rate or can_timing.MOST_BIT_RATE
+        self.wire_us = self._wire(rate, self.data_rate).us
+        # No rate that is only usual makes a stamp late.
+        self.least_us = self._wire(rate, data_bit_rate_kbit_s or MOST_DATA_BIT_RATE).least_us
 
-    def _wire_us(self, rate: float) -> Floats:
-        data_rate = max(self.data_rate, rate)
-        return wire_times(self.frames, self.stretch.taken, bit_rate_kbit_s=rate, data_bit_rate_kbit_s=data_rate).us
+    def _wire(self, rate: float, data_rate: float) -> WireTimes:
+        data_rate = max(data_rate, rate)
+        return wire_times(self.frames, self.stretch.taken, bit_rate_kbit_s=rate, data_bit_rate_kbit_s=data_rate)
 
     def _at(self, index: int) -> _Moment:
         """Time and number of a frame by its index in the log."""
@@ -228,7 +231,8 @@ class _Log:
         none: _Ends = (None, None)
         gap: _Ends = none if widest is None else self._at(int(stretch.taken[widest + 1]))
         first_error, last_error = (self._error(place) if frames.errors else none for place in (0, -1))
-        possible = {} if self.rate else {rate: self._fullest(self._wire_us(rate)) for rate in self.possible}
+        rates = () if self.rate else self.possible
+        possible = {rate: self._fullest(self._wire(rate, self.data_rate).us) for rate in rates}
         return LogContents(
             day_of(int(frames.start_s * 1e9)),
             len(stretch.taken),
@@ -249,7 +253,7 @@ class _Log:
             frames.dropped,
             frames.remote,
             can_timing.step_us(stretch) if len(gaps_us) else 0.0,
-            _rounded(can_timing.late_stamps_us(frames, stretch, bit_us(self.rate or can_timing.MOST_BIT_RATE))),
+            _rounded(can_timing.late_stamps_us(stretch, self.least_us)),
             self.canopen,
             tuple(self._identifiers()),
             tuple(self._emergencies()),
