@@ -4,9 +4,6 @@ from collections.abc import Iterator
 from fractions import Fraction
 from random import Random
 
-from hypothesis import given
-from hypothesis import strategies as st
-
 from tests.buses.polled.test_adapter import RandomBus, ends_us
 from tests.oracles.adapter_simulation import Exchange
 
@@ -48,8 +45,8 @@ class OneWayBus(RandomBus):
         self.groups = groups
 
 
-@given(st.integers(0, 10**9))
-def test_a_cycle_with_nodes_of_one_way_is_never_outside_its_ends(seed: int) -> None:
-    bus = OneWayBus(Random(seed))
-    least_us, most_us = ends_us(bus.profile())
-    assert least_us * (1 - 1e-9) <= bus.simulated_us() <= most_us * (1 + 1e-9), (seed, vars(bus))
+def test_a_cycle_with_nodes_of_one_way_is_never_outside_its_ends() -> None:
+    for seed in range(300):
+        bus = OneWayBus(Random(seed))
+        least_us, most_us = ends_us(bus.profile())
+        assert least_us * (1 - 1e-9) <= bus.simulated_us() <= most_us * (1 + 1e-9), (seed, vars(bus))
