@@ -146,3 +146,10 @@ def test_a_kind_that_cannot_have_it_is_a_row_with_the_reason(tmp_path: Path) -> 
 def rows_of(answer: busplan.CompareAnswer, folder: Path) -> list[dict[str, Any]]:
     answer.save(folder / "rows.csv")
     return [*csv.DictReader((folder / "rows.csv").read_text(encoding="utf-8").splitlines())]
+
+
+def test_a_bus_without_the_wake_up_of_the_host_says_so() -> None:
+    said = "Without the host's wake-up, bus.sync_jitter_us: SERCOS I and II."
+    for jitter_us in (0, 780):
+        profile = busplan.load_profile("can-servo-8", changes={"bus.sync_jitter_us": jitter_us} if jitter_us else {})
+        assert (said in str(busplan.compare(profile))) == bool(jitter_us)
