@@ -323,7 +323,8 @@ def test_the_adapter_is_in_the_time_of_the_host(folder: Path) -> None:
     )
     answer = shown(folder, rows((0, 0x141), (300, 0x241), (500, 0x142), (800, 0x242), late={}), plan)
     (host,) = (share for share in answer.shares if share.waits_for == "host")
-    assert (host.recorded_us, host.planned_us) == (pytest.approx(200 - 115, abs=8), pytest.approx(20 + 50 + 70))
+    assert host.recorded_us == pytest.approx(200 - 115, abs=8)
+    assert host.planned_us == pytest.approx(20 + 50 + 70)
     assert "adapter" in {event.waits_for for event in answer.planned_events}
     assert "host and adapter" in str(answer)
 
