@@ -439,3 +439,13 @@ def test_recordings_without_a_cycle_are_refused(folder: Path) -> None:
     del alone["bus"]["host_us"]
     with pytest.raises(BusplanError, match="a network of messages alone has no cycle, which timeline needs"):
         busplan.timeline(written(folder, alone), recording=path)
+
+
+@pytest.mark.parametrize("access", ["polled", "burst"])
+def test_measured_and_timeline_plan_the_same_cycle(tmp_path: Path, access: str) -> None:
+    plan = busplan.load_profile("can-fd-motors-8", changes={"bus.access": access})
+    path = tmp_path / "r.log"
+    busplan.emulate(plan, cycles=30).save(path)
+    figures = {figure.quantity: figure.planned for figure in busplan.measured(plan, path).figures}
+    shown = busplan.timeline(plan, recording=path)
+    assert shown.planned_us == pytest.approx(figures["last answer after the first request"])

@@ -304,7 +304,12 @@ class _CanCycles(RecordedCycles):
             planned = self.cycle.at(numbers[due])
         events = [*planned_events(planned.events(), planned.term_figures, others=_OTHERS, names=names)]
         frames = [place for place, (kind, _) in enumerate(events) if kind in _FRAMES]
-        return from_zero(event for _, event in events[frames[0] : frames[-1] + 1]) if frames else ()
+        if not frames:
+            return ()
+        # Of requests at once the host makes all but the first behind the first frame.
+        others = [event for kind, event in events[: frames[0]] if kind == "host"][1:]
+        first, *rest = (event for _, event in events[frames[0] : frames[-1] + 1])
+        return from_zero([first, *others, *rest])
 
     def _remarks(self, cycle: int) -> Iterator[str]:
         yield from can_timing.faults(self.frames, self.stretch)
@@ -333,7 +338,7 @@ class _Waits:
         self.is_burst, bus = cycles.traffic.access == "burst", cycles.network.profile.bus
         of_host = groupby(planned, key=lambda event: event.waits_for in ("host", "adapter"))
         runs_us = (sum(event.duration_us for event in run) for is_host, run in of_host if is_host)
-        self.host_us = max(runs_us, default=0.0)
+        self.host_us = bus.host_us if self.is_burst else max(runs_us, default=0.0)
         """Planned time of the host and its adapter before a command."""
         self.waits_for_all = self.has_sync and not bus.pipeline_cycles
         self.left = set(np.flatnonzero(cycles.cycle_of == cycle).tolist())

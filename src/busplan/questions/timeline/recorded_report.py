@@ -83,8 +83,8 @@ def _word(answer: RecordedTimelineAnswer, awaited: Awaited) -> str:
 def _summary(answer: RecordedTimelineAnswer) -> blocks.Sentence:
     which = {"worst": ", the longest", "median": ", the median one", None: ""}[answer.chosen]
     template = (
-        f"{{}} beside {{}}: cycle {answer.cycle:,}{which} of {answer.cycles:,} whole ones, from frame {answer.frame:,} "
-        f"at {answer.start_s:.6f} s, takes {{}}, and {{}} in the plan."
+        f"{{}} beside {{}}: cycle {answer.cycle:,}{which} of {answer.cycles:,} whole ones, from frame "
+        f"{answer.frame:,}, begun at {answer.start_s:.6f} s, takes {{}}, and {{}} in the plan."
     )
     return blocks.sentence(
         template,
