@@ -130,6 +130,8 @@ class CompareAnswer(Answer):
         Name of the group whose nodes are counted for the most axes; empty where all nodes are alike.
     execution
         The grade of the execution times, in words.
+    wake_up
+        Key of the host's latest wake-up on the profile's kind of bus; empty where it has none.
     kinds
         The kinds in the order of the argument; of all, the profile's own first. Each has `figures` at the profile's
         period, its `smallest` period and its most `safe` axes, or the reason why it has none.
@@ -140,6 +142,7 @@ class CompareAnswer(Answer):
     axes: int
     counted: str
     execution: tuple[Sentence, ...]
+    wake_up: str
     kinds: tuple[MachineOnKind | NotOnKind, ...]
 
     @property
@@ -237,6 +240,7 @@ def compare(
         int(network.axes),
         varied_nodes(network.profile).name,
         tuple(execution_sentence(network)),
+        network.bus.key_of("wake-up"),
         tuple(with_curves),
     )
 

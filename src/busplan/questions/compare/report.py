@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from itertools import cycle
 from typing import Final
 
-from busplan.buses import kind_named
 from busplan.buses.figure import SAFE_AXES, VERDICT, Ink
 from busplan.english import listed, nouns, plural
 from busplan.forms import blocks, charts
@@ -140,9 +139,8 @@ def _best(answer: CompareAnswer) -> Iterator[blocks.Sentence]:
     if unranked:
         words = f"Not ranked, because the host's time is assumed: {listed(unranked, 'and')}."
         yield blocks.Sentence((words,), "warns")
-    wake_up = kind_named(answer.profile.bus.kind).key_of("wake-up")
-    if without := [machine.title for machine in answer.compared if wake_up in machine.left_out]:
-        words = f"Without the host's wake-up, {wake_up}: {listed(without, 'and')}."
+    if without := [machine.title for machine in answer.compared if answer.wake_up in machine.left_out]:
+        words = f"Without the host's wake-up, {answer.wake_up}: {listed(without, 'and')}."
         yield blocks.Sentence((words,), "warns")
 
 
