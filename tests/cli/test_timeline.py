@@ -65,6 +65,7 @@ def test_a_drawing_takes_the_width_of_its_terminal(on_terminal: Callable[..., tu
 
 
 def test_a_cycle_of_a_recording_is_shown_beside_the_plan(busplan: Run, tmp_path: Path) -> None:
+    pytest.importorskip("can", reason="needs python-can, which reads logs")
     busplan("emulate", "can-servo-8", "--cycles", "40", "-o", "bus.log", cwd=tmp_path)
     log = (tmp_path / "bus.log").read_bytes()
     beside = ("timeline", "can-servo-8", "--recording", "bus.log")
