@@ -12,6 +12,7 @@ from busplan.cli.answering import profile_files, require_apart
 from busplan.cli.command import Call, Fails, command, load_each
 from busplan.cli.options import (
     ALL_MODELS,
+    ChannelOption,
     TimingModelOption,
     chosen_model,
     complete_profile,
@@ -220,9 +221,7 @@ def timeline_command(
             "file, of CAN a log of candump, ASC, BLF or TRC, or a capture of SocketCAN.  [default: the plan alone]",
         ),
     ] = None,
-    channel: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
-    ] = None,
+    channel: ChannelOption = None,
 ) -> "Answer":
     """Show one communication cycle as events, node by node and to scale.
 
@@ -361,9 +360,7 @@ def report_command(
             "with its longest cycle.  [default: none]",
         ),
     ] = None,
-    channel: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
-    ] = None,
+    channel: ChannelOption = None,
 ) -> "Answer":
     """Put the answers for a profile on one page, for a screen, a machine's file or a repository.
 

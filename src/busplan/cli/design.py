@@ -18,6 +18,7 @@ from busplan.cli.options import (
     STANDARD_OUTPUT,
     VALUES_HELP,
     AllOption,
+    ChannelOption,
     FormatOption,
     JobsOption,
     complete_kind,
@@ -332,9 +333,7 @@ def measured_command(
             show_default=False,
         ),
     ] = 1.0,
-    channel: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
-    ] = None,
+    channel: ChannelOption = None,
     bit_rate: Annotated[
         float | None,
         typer.Option(
@@ -598,9 +597,7 @@ def import_command(
     bus: Annotated[
         str | None, typer.Option(metavar="NAME", help="Bus of a database of messages.  [default: the only one]")
     ] = None,
-    channel: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
-    ] = None,
+    channel: ChannelOption = None,
     period: Annotated[
         str | None,
         typer.Option(

@@ -125,6 +125,9 @@ NoPagerOption = Annotated[
     bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is longer than the terminal.")
 ]
 FormatOption = Annotated[Form | None, format_option("table")]
+ChannelOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Channel of a CAN log.  [default: the only one]")
+]
 JobsOption = Annotated[
     int | None,
     typer.Option(

@@ -7,7 +7,7 @@ breaks them loads, and the analysis says why it does not fit.
 from collections.abc import Iterator
 from itertools import pairwise
 from math import inf
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
@@ -65,6 +65,16 @@ def time_uncertainty_us(us: Number, *, is_guess: bool) -> Number:
     A guess is between 0 and twice its value; a given time is known to 10 %.
     """
     return choose(is_guess, GUESS_SHARE, UNKNOWN_SHARE) * us
+
+
+def worst_of_cycles(jitter: str) -> Any:
+    """Key beside a jitter, by the name of its key: the number of measured cycles of which it is the worst."""
+    return Field(
+        default=None,
+        description=f"Measured cycles of which {jitter} is the worst: then it is no bound, and a plan is shown "
+        "to fit only where limits.missed_cycles accepts a later one",
+        examples=[900_000],
+    )
 
 
 class GradedExecution(Section):

@@ -37,6 +37,7 @@ from busplan.sections.cycle import (
     NodeSection,
     PayloadSection,
     time_uncertainty_us,
+    worst_of_cycles,
 )
 from busplan.sections.profile import CIRCLE_SECTIONS, OF_ALIKE_NODES, Profile
 
@@ -98,12 +99,7 @@ class CanBus(BusSection):
         description="Largest delay of SYNC by the host, under the period; it shortens the cycle [us]",
         examples=[50],
     )
-    sync_jitter_cycles: Count | None = Field(
-        default=None,
-        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
-        "to fit only where limits.missed_cycles accepts a later one",
-        examples=[900_000],
-    )
+    sync_jitter_cycles: Count | None = worst_of_cycles("sync_jitter_us")
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; 0: the host computes within the cycle; "

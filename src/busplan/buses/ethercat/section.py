@@ -26,6 +26,7 @@ from busplan.sections.cycle import (
     NodeSection,
     PayloadSection,
     time_uncertainty_us,
+    worst_of_cycles,
 )
 from busplan.sections.profile import Profile
 
@@ -94,12 +95,7 @@ class EthercatBus(BusSection):
     master_jitter_us: TimeUs = Field(
         default=0.0, description="Latest start of the frames after the task [us]", examples=[20]
     )
-    master_jitter_cycles: Count | None = Field(
-        default=None,
-        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
-        "to fit only where limits.missed_cycles accepts a later one",
-        examples=[900_000],
-    )
+    master_jitter_cycles: Count | None = worst_of_cycles("master_jitter_us")
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(
         default_factory=lambda: int(c.PIPELINE_CYCLES),
         description="Cycles from feedback to the command computed from it; for latency, and a loop on the host",

@@ -23,6 +23,7 @@ from busplan.sections.cycle import (
     SliceRatio,
     TableExecution,
     time_uncertainty_us,
+    worst_of_cycles,
 )
 from busplan.sections.profile import Profile
 
@@ -92,12 +93,7 @@ class Ieee1394Bus(BusSection):
         "bus's own and stay punctual [us]",
         examples=[50],
     )
-    sync_jitter_cycles: Count | None = Field(
-        default=None,
-        description="Measured cycles of which sync_jitter_us is the worst: then it is no bound, and a plan is shown "
-        "to fit only where limits.missed_cycles accepts a later one",
-        examples=[900_000],
-    )
+    sync_jitter_cycles: Count | None = worst_of_cycles("sync_jitter_us")
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
         default=None,
         description="Repeat delay of one PHY; without it 14 ticks of the base rate, 0.142 us (TI TSB12LV41: 0.144 us "

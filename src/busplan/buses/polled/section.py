@@ -9,7 +9,7 @@ from busplan.buses.polled.protocols import ADAPTERS, PROTOCOLS, UNLIMITED, UNLIM
 from busplan.elementwise import Number
 from busplan.english import listed
 from busplan.sections.base import Bytes, Count, Problem, Section, TimeUs
-from busplan.sections.cycle import BusSection, time_uncertainty_us
+from busplan.sections.cycle import BusSection, time_uncertainty_us, worst_of_cycles
 from busplan.sections.profile import Profile
 
 BitTimes = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
@@ -183,12 +183,7 @@ class PolledBus(BusSection):
         description="Latest start of a cycle by the master; the cycle ends before the next one [us]",
         examples=[50],
     )
-    master_jitter_cycles: Count | None = Field(
-        default=None,
-        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
-        "to fit only where limits.missed_cycles accepts a later one",
-        examples=[900_000],
-    )
+    master_jitter_cycles: Count | None = worst_of_cycles("master_jitter_us")
     global_control: bool = Field(
         default=False,
         description="Whether a broadcast opens the cycle, as Global Control of isochronous PROFIBUS",

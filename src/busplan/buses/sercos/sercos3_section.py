@@ -12,7 +12,7 @@ from busplan.buses.sercos.sercos3 import (
 )
 from busplan.buses.sercos.shared import MOST_PIPELINE
 from busplan.sections.base import Count, TimeUs
-from busplan.sections.cycle import BusSection
+from busplan.sections.cycle import BusSection, worst_of_cycles
 from busplan.sections.profile import Profile
 
 
@@ -49,12 +49,7 @@ class Sercos3Bus(BusSection):
         description="Jitter with which the master sends; CoSeMa demands an eighth of the period at most [us]",
         examples=[0.1],
     )
-    master_jitter_cycles: Count | None = Field(
-        default=None,
-        description="Measured cycles of which master_jitter_us is the worst: then it is no bound, and a plan is shown "
-        "to fit only where limits.missed_cycles accepts a later one",
-        examples=[900_000],
-    )
+    master_jitter_cycles: Count | None = worst_of_cycles("master_jitter_us")
     master_delay_us: TimeUs = Field(
         default_factory=lambda: float(c.MASTER_DELAY_US),
         description="From the start of a cycle in the master to the end of the first header [us]",
