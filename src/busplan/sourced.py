@@ -3,12 +3,12 @@
 import re
 import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from functools import lru_cache, wraps
 from importlib.resources import files
 from math import nan
-from threading import Event, Lock
+from threading import Lock
 from types import MappingProxyType, SimpleNamespace
 from typing import Any, Final, Literal, NamedTuple, ParamSpec, Self, TypeAlias, TypeVar, cast
 
@@ -93,8 +93,7 @@ def changed_constants() -> ChangedConstants:
     return _CHANGED.get()
 
 
-@contextmanager
-def constants_changed(changed: ChangedConstants) -> Iterator[None]:
+def constants_changed(changed: ChangedConstants) -> AbstractContextManager[None]:
     """Compute with these other values of constants, and no others; each thread has its own.
 
     Examples
@@ -106,44 +105,41 @@ def constants_changed(changed: ChangedConstants) -> Iterator[None]:
     >>> paper.MAX_HOPS
     16.0
     """
-    if changed:
-        _look_up_each_time()
-    token = _CHANGED.set(changed)
-    try:
-        yield
-    finally:
-        _CHANGED.reset(token)
+    return _set(_CHANGED, changed)
 
 
 _LOOKED_UP: Final[ContextVar[Callable[["Sourced"], Any] | None]] = ContextVar("constants looked up", default=None)
 
 
-@contextmanager
-def constants_looked_up(form: Callable[[Sourced], Any] | None) -> Iterator[None]:
+def constants_looked_up(form: Callable[[Sourced], Any] | None) -> AbstractContextManager[None]:
     """Give constants in another form where they are looked up, as traced numbers; None for plain constants."""
-    if form:
-        _look_up_each_time()
-    token = _LOOKED_UP.set(form)
-    try:
-        yield
-    finally:
-        _LOOKED_UP.reset(token)
+    return _set(_LOOKED_UP, form)
 
 
 _LOCK: Final = Lock()
-_EVER_CHANGED: Final = Event()
-"""Until the first change a constant that was looked up is an attribute, which is as fast as a name of a module."""
+_OTHERS: Final[list[object]] = []
+"""Other values and forms that hold now in any thread. Without any, a constant that was looked up is an attribute, which
+is as fast as a name of a module."""
 _ALL: Final[list["Constants"]] = []
 
 
-def _look_up_each_time() -> None:
-    """From now on look constants up wherever they are used, in all threads."""
-    if not _EVER_CHANGED.is_set():
+@contextmanager
+def _set(variable: ContextVar[Any], value: object) -> Iterator[None]:
+    """Set a variable; while it has a value, all threads look constants up wherever they are used."""
+    if value:
         with _LOCK:
-            for constants in _ALL:
+            for constants in () if _OTHERS else _ALL:
                 for name in constants:
                     vars(constants).pop(name, None)
-            _EVER_CHANGED.set()
+            _OTHERS.append(value)
+    token = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(token)
+        if value:
+            with _LOCK:
+                _OTHERS.pop()
 
 
 _Parameters = ParamSpec("_Parameters")
@@ -224,9 +220,10 @@ class Constants(Mapping[str, Sourced]):
             number = (self._versions.get(changed) or self._numbers(changed))[name]
         except KeyError:
             raise AttributeError(f"no constant {name}") from None
-        with _LOCK:
-            if not _EVER_CHANGED.is_set():
-                vars(self)[name] = number
+        if not _OTHERS:
+            with _LOCK:
+                if not _OTHERS:
+                    vars(self)[name] = number
         return _in_form(number)
 
     def __iter__(self) -> Iterator[str]:
