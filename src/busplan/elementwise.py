@@ -181,6 +181,11 @@ class TracedConstant(Traced):
         return self.constant.meaning
 
 
+def are_plain(*numbers: Number) -> bool:
+    """Whether all numbers are plain: no arrays, and none traced."""
+    return all(isinstance(number, _PLAIN) for number in numbers)
+
+
 def value_of(operand: Number) -> float:
     """Plain number of any operand; a word, which `==` compares, too, stays a word."""
     value: Any = operand.value if isinstance(operand, Traced) else operand
@@ -304,7 +309,9 @@ def is_everywhere(condition: Number) -> bool:
     >>> is_everywhere(2 > 3)
     False
     """
-    return bool(getattr(condition, "all", lambda: condition)())
+    if isinstance(condition, bool):
+        return condition
+    return bool(condition.all() if hasattr(condition, "all") else condition)
 
 
 def square_root(number: Number) -> Number:
@@ -456,12 +463,12 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
     >>> pointwise(lambda left, right: left // right, 7, 2, words="the quotient")
     3
     """
+    if are_plain(*numbers):
+        return function(*numbers)
     if any(isinstance(number, Traced) for number in numbers):
         with constants_looked_up(None):
             value = function(*map(value_of, numbers))
         return Traced(value, formula=words, numbers=short(value), parts=numbers)
-    if all(isinstance(number, _PLAIN) for number in numbers):
-        return function(*numbers)
     import numpy as np
 
     # Plain numbers are repeated, and arrays read as they are asked for: neither their number nor their size is bounded.

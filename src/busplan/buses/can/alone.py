@@ -71,8 +71,16 @@ class CanCycle(BusCycle):
         self.traffic = traffic if model == WORST_STUFFING else replace(traffic, is_stuffed=False)
         """Traffic, by default the network's; its frames are as long as in the timing model."""
 
+    @classmethod
+    def made(cls, network: Network, model: str, traffic: Traffic) -> Self:
+        """The cycle of a network's traffic under a timing model, which the traffic keeps: each limit asks for it."""
+        cycle: Self = traffic.results.setdefault((cls, model), cls(network, model, traffic=traffic))
+        return cycle
+
     def of(self, traffic: Traffic) -> Self:
         """The cycle of other traffic of the same sort."""
+        if self.number is None:
+            return self.made(self.network, self.model, traffic)
         return type(self)(self.network, self.model, self.number, traffic=traffic)
 
     @cached_property
@@ -86,7 +94,8 @@ class CanCycle(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate, and the load of the bus, also with as many stuff bits as measured frames have."""
-        least, most = (type(self)(self.network, model).load for model in (NO_STUFFING, WORST_STUFFING))
+        sent = traffic_of(self.network)
+        least, most = (self.made(self.network, model, sent).load for model in (NO_STUFFING, WORST_STUFFING))
         return {
             "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s,
             "bus_load": self.load,

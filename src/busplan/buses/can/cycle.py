@@ -48,4 +48,4 @@ def can_cycle(network: Network, model: str, *, traffic: Traffic | None = None) -
     """The cycle of a network under a timing model; its traffic is by default that of the network."""
     sent = traffic or traffic_of(network)
     sort = MessagesAlone if not sent.has_cycle else SyncCycle if sent.has_sync else RequestCycle
-    return sort(network, model, traffic=sent)
+    return sort.made(network, model, sent)

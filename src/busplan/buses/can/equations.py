@@ -6,8 +6,8 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from busplan.buses.figure import BusFigures, OwnFigures, read_figures
-from busplan.elementwise import Number, choose, is_off, larger, next_entry, rounded_down, rounded_up, smaller
-from busplan.sourced import Constants
+from busplan.elementwise import Number, are_plain, choose, is_off, larger, next_entry, rounded_down, rounded_up, smaller
+from busplan.sourced import Constants, cached
 
 BIT_RATES: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
 """Bit rates that CiA 301 names [kbit/s]."""
@@ -148,12 +148,27 @@ def frame_us(
     >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, data_bit_rate_kbit_s=2000, is_stuffed=True)
     121.5
     """
+    given = data_bytes, identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, late_bits, is_stuffed
+    return (_of_plain if are_plain(*given) else _frame_us)(*given)
+
+
+def _frame_us(
+    data_bytes: Number,
+    identifier_bits: Number,
+    bit_rate_kbit_s: Number,
+    data_bit_rate_kbit_s: Number,
+    late_bits: Number,
+    is_stuffed: bool,  # noqa: FBT001 - a number of the frame as the others
+) -> Number:
     if not is_off(data_bit_rate_kbit_s):
         nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
         nominal = nominal if is_off(late_bits) else nominal + late_bits
         return nominal * bit_us(bit_rate_kbit_s) + data * bit_us(data_bit_rate_kbit_s)
     bits = frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
     return bits * bit_us(bit_rate_kbit_s)
+
+
+_of_plain: Final = cached(4096)(_frame_us)
 
 
 def payload_us(
