@@ -167,6 +167,8 @@ class CanCycle(BusCycle):
     def _with_burst(self, repeated: int) -> Network:
         """The network with some repeated frames in a row; 0 without errors."""
         profile = self.network.profile
+        if not repeated and profile.bus.error_period_us is None:
+            return self.network
         period_us = (profile.bus.error_period_us or MAX_TIME_US) if repeated else None
         errors = {"error_burst": repeated or None, "error_period_us": period_us}
         bus = profile.bus.model_copy(update=errors)

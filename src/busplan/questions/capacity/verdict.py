@@ -190,7 +190,8 @@ def _verdict(
         change=None if mended is None else Change(mending.changes or {}, mended.nodes, mended),
         no_change=mending.why,
     )
-    card, brief_card = _cards(verdict, network, bus_lines=cycle.card_lines(is_shown_to_fit))
+    bus_lines = cycle.card_lines(lambda tried: deciding.verdict == FITS if tried is network else is_shown_to_fit(tried))
+    card, brief_card = _cards(verdict, network, bus_lines=bus_lines)
     return replace(verdict, card=card, brief_card=brief_card)
 
 
