@@ -12,7 +12,7 @@ from busplan.buses.can import response
 from busplan.buses.can.equations import bit_us, c
 from busplan.buses.can.streams import Points, Stream, last_place, repeated, repeated_by_place, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic, kept
-from busplan.elementwise import choose, is_everywhere, is_off, larger, smaller, total
+from busplan.elementwise import are_plain, choose, is_everywhere, is_off, larger, smaller, total
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,7 +71,14 @@ def longest_cycle(traffic: Traffic, others_us: Points, due: frozenset[str] | Non
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
+    return (_longest_of_plain if are_plain(others_us) else _longest)(traffic, others_us, due)
+
+
+def _longest(traffic: Traffic, others_us: Points, due: frozenset[str] | None) -> LongestCycle:
     return _longest_cycle(offered(traffic), traffic, others_us, due)
+
+
+_longest_of_plain: Final = kept(_longest)
 
 
 def _longest_cycle(
