@@ -158,7 +158,7 @@ def _frame_us(
     bit_rate_kbit_s: Number,
     data_bit_rate_kbit_s: Number,
     late_bits: Number,
-    is_stuffed: bool,  # noqa: FBT001 - a number of the frame as the others
+    is_stuffed: bool,
 ) -> Number:
     if not is_off(data_bit_rate_kbit_s):
         nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
