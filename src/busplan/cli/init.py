@@ -138,7 +138,12 @@ def init_command(
     if source is None:
         kind, variant = values.kind()
         machine = _machine(kind, variant, values)
-        text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
+        try:
+            text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
+        except BusplanError as refused:
+            if machine.host and str(refused).startswith("bus."):  # a key that nobody wrote
+                raise BusplanError(f"--host {machine.host}: {refused}; a longer --period has room") from None
+            raise
     else:
         if values.given:
             options = " and ".join(values.given)

@@ -455,7 +455,7 @@ class CanProfile(Profile):
         for section, nodes in zip(names, self.node_groups, strict=True):
             for kind in TRANSACTION_KINDS:
                 if nodes.bytes_of(kind) <= 0:
-                    why = "comes to 0 bytes, and a command and its answer have data"
+                    why = "comes to 0 bytes, and a command and its answer have data: 1 or more"
                     yield Problem(why, f"{section}.{nodes.payload.key_of(kind)}", "inconsistent")
 
     def _names_problems(self) -> Iterator[Problem]:
