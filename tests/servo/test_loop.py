@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,13 @@ NODE = LoopTiming(period_us=500.0, step_us=500.0)
 HOST = LoopTiming(period_us=1000.0, step_us=250.0, loop="host")
 PLACES = [(NODE, 0.0), (HOST, 0.0), (HOST, 317.0), (HOST, 1000.0), (HOST, 2317.0)]
 """Timing, and delay of the axis."""
+LOOPS = [
+    (controller, *place)
+    for row, controller in enumerate(CONTROLLERS)
+    for column, place in enumerate(PLACES)
+    if (row + column) % 2 == 0
+]
+"""Each controller at three places or two, and each place with as many controllers."""
 
 
 def an_axis(**changes: Any) -> Axis:
@@ -56,12 +64,8 @@ def all_at_once(loop: "control.StateSpace", frequency_hz: Floats) -> NDArray[np.
 
 
 def test_the_simulated_frequency_response_is_the_loops(reference_loop: Loop) -> None:
-    for controller, timing, delay_us, cycles_per_wave in [
-        (controller, *place, (50, 200)[(row + column) % 2])
-        for row, controller in enumerate(CONTROLLERS)
-        for column, place in enumerate(PLACES)
-    ]:
-        axis, cycles = an_axis(**controller, delay_us=delay_us), 8000
+    for (controller, timing, delay_us), cycles_per_wave in zip(LOOPS, cycle([50, 200]), strict=False):
+        axis, cycles = an_axis(**controller, delay_us=delay_us), 4000
         wave = np.exp(2j * math.pi * np.arange(cycles + 1) / cycles_per_wave)
         real, imaginary = (simulate_axis(part.copy(), axis=axis, timing=timing) for part in (wave.real, wave.imag))
         # At the end of the last period a host aims at the last set-point, a node at the one before.
@@ -73,16 +77,7 @@ def test_the_simulated_frequency_response_is_the_loops(reference_loop: Loop) -> 
 # --- formulas against python-control -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("controller", "timing", "delay_us"),
-    # Each controller at three places or two, and each place with as many controllers.
-    [
-        (controller, *place)
-        for row, controller in enumerate(CONTROLLERS)
-        for column, place in enumerate(PLACES)
-        if (row + column) % 2 == 0
-    ],
-)
+@pytest.mark.parametrize(("controller", "timing", "delay_us"), LOOPS)
 def test_the_margins_are_python_controls(
     reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, delay_us: float
 ) -> None:
