@@ -144,7 +144,7 @@ def test_a_log_holds_the_adapter_and_the_host_in_one(run: Run, tmp_path: Path) -
     (tmp_path / "slow.toml").write_text(text_of(slow))
     (tmp_path / "line.toml").write_text(text_of(machine(**GIVEN)))
     log = tmp_path / "bus.log"
-    assert run("emulate", "slow.toml", "--output", log.name, cwd=tmp_path).returncode == 0
+    assert run("emulate", "slow.toml", "--cycles", "200", "--output", log.name, cwd=tmp_path).returncode == 0
     log.write_text(re.sub(r"\) \S+ ", ") can0 ", log.read_text()))
     assert run("check", "slow.toml", "--recording", log.name, cwd=tmp_path).returncode == 0
     done = run("check", "line.toml", "--recording", log.name, cwd=tmp_path)
