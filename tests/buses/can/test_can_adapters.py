@@ -86,9 +86,8 @@ def test_a_host_with_cycles_of_its_own_has_the_adapter_in_the_loop_alone(adapter
     ],
 )
 def test_the_circle_has_the_loop_of_latency(update: str, bus: dict[str, Any]) -> None:
-    own = busplan.load_profile(
-        machine(**bus), changes={"servo.loop": "host", "servo.update": update, "servo.position_gain_per_s": 5.0}
-    )
+    servo = {"servo.loop": "host", "servo.update": update, "servo.position_gain_per_s": 5.0}
+    own = busplan.load_profile(machine(**bus), changes={**servo, "circle.radius_mm": 2.0})
     # Of a burst the command has arrived before the answers.
     answers_us = 4 * 95 + READ_US if bus.get("access") == "burst" else 0
     assert busplan.circle_test(own).results[0].delay_y_us + answers_us == responses(own)["loop"]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import busplan
-from tests.buses.can.machines import figures, terms
+from tests.buses.can.machines import figures
 
 Run = Callable[..., Any]
 HEAD = """\

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
-from tests.buses.can.machines import WORST, figures, loaded, responses, terms, text_of
+from tests.buses.can.machines import WORST, figures, loaded, responses, text_of
 
 
 def group(name: str, nodes: int, *, size: int = 8, axes: int = 1, **keys: Any) -> dict[str, Any]:

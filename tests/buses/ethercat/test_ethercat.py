@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -18,6 +18,7 @@ import busplan
 from busplan.buses import kind_named
 from busplan.errors import BusplanError
 from busplan.sections.base import value_at
+from tests.registers import at_least
 
 Run = Callable[..., Any]
 
@@ -129,6 +130,7 @@ def test_three_frames_in_a_cycle() -> None:
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
 
 
+@settings(max_examples=at_least(6))
 @given(st.integers(1, 1474), st.booleans(), st.booleans(), st.integers(0, 1), st.integers(300, 4000))
 def test_all_numbers_of_devices_up_to_the_most_fit_and_no_more_than_it_takes_are_denied(
     size: int, clocks: bool, apart: bool, polls: int, period_us: int
