@@ -53,7 +53,7 @@ def test_a_picture_is_the_same_on_every_computer(monkeypatch: pytest.MonkeyPatch
     svg = busplan.timeline("paper-4ms").svg()
     here = png(svg)
     monkeypatch.setattr(resvg_py, "svg_to_bytes", partial(resvg_py.svg_to_bytes, skip_system_fonts=True))
-    assert png(svg) == here == png(svg)
+    assert png(svg) == here
 
 
 def test_a_character_that_no_font_has_is_a_box() -> None:
