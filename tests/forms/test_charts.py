@@ -26,7 +26,9 @@ ANSWERS: Mapping[str, Callable[[], Any]] = {
     "words": lambda: busplan.map_(
         "paper-1ms", x={"bus.gap_count": [5, 7, "optimal"]}, y={"cycle.period_us": range(250, 4001, 250)}
     ),
-    "circle": lambda: busplan.circle_test("dvrk", contributions=True),
+    "circle": lambda: busplan.circle_test(
+        busplan.load_profile("dvrk", changes={"circle.radius_mm": 40.0}), contributions=True
+    ),
 }
 EACH = pytest.mark.parametrize("name", ANSWERS)
 

@@ -382,12 +382,10 @@ def test_no_plan_is_made_where_no_period_keeps_a_deadline() -> None:
 @pytest.mark.parametrize("nodes", [8, 20])
 def test_the_smallest_period_keeps_the_load(nodes: int) -> None:
     many = busplan.load_profile("can-servo-8", changes={"bus.nodes": nodes})
-    smallest_us = busplan.capacity(many).results[0].safe_min_period_us or 0.0
-    at, _ = busplan.capacity(busplan.load_profile(many, changes={"cycle.period_us": smallest_us})).results
+    smallest_us = figures(many).safe_min_period_us or 0.0
+    at = figures(busplan.load_profile(many, changes={"cycle.period_us": smallest_us}))
     assert (at.verdict, at.exceeded) == ("fits", ())
-    below, _ = busplan.capacity(
-        busplan.load_profile(many, changes={"cycle.period_us": smallest_us * (1 - 1e-6)})
-    ).results
+    below = figures(busplan.load_profile(many, changes={"cycle.period_us": smallest_us * (1 - 1e-6)}))
     assert below.verdict != "fits"
 
 

@@ -243,7 +243,7 @@ def test_both_forms_give_the_same_floats(seed: int) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("data_bytes", [(), (2,), (0, 8), (5, 3, 1), (1, 8, 2, 4)])
+@pytest.mark.parametrize("data_bytes", [(), (2,), (0, 8), (1, 8, 2, 4)])
 def test_a_cycle_waits_for_the_three_longest_frames_behind_it(data_bytes: tuple[int, ...], form: str) -> None:
     behind = [
         {"name": f"m{size}", "identifier": 0x7F0 + size, "payload_bytes": size, "period_us": 1e6, "deadline_us": 1e5}
