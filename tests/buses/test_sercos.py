@@ -16,7 +16,7 @@ from busplan.buses.limits import ANY_PERIOD, Periods
 from tests.registers import at_least
 
 Run = Callable[..., Any]
-FEW = settings(max_examples=at_least(7))
+FEW = settings(max_examples=at_least(3))
 KINDS = pytest.mark.parametrize("kind", ["sercos3", "sercos2"])
 KNOWN = Periods((31.25, 62.5, 125.0, 250.0, 500.0))
 
@@ -38,7 +38,7 @@ def test_rounding_asks_for_no_longer_period() -> None:
 
 
 @KINDS
-@pytest.mark.parametrize("period_us", [40.0, 300.0, 1500.5, 70_000.0])
+@pytest.mark.parametrize("period_us", [40.0, 300.0, 70_000.0])
 def test_capacity_check_and_sweep_name_an_unknown_period(kind: str, period_us: float, run: Run, tmp_path: Path) -> None:
     name, bus = f"{kind}-servo-8", kind_named(kind)
     profile = busplan.load_profile(name, changes={"cycle.period_us": period_us, "servo.step_us": period_us})
@@ -101,11 +101,11 @@ def test_no_known_period_is_long_enough_for_everything(kind: str, run: Run, tmp_
 
 @KINDS
 def test_every_row_of_a_sweep_equals_capacity_of_its_point(kind: str, run: Run, tmp_path: Path) -> None:
-    vary = {"bus.nodes": "1,8,61,300", "cycle.period_us": "260,500,3000", "payload.read_bytes": "3,150"}
+    vary = {"bus.nodes": "1,61", "cycle.period_us": "260,3000", "payload.read_bytes": "3,150"}
     options = [word for key, ones in vary.items() for word in ("--vary", f"{key}={ones}")]
     done = run("sweep", f"{kind}-servo-8", *options, "--format", "json", cwd=tmp_path)
     rows = json.loads(done.stdout)["rows"]
-    assert len(rows) == 2 * 4 * 3 * 2
+    assert len(rows) == 2 * 2 * 2 * 2
     for row in rows:
         own = busplan.load_profile(f"{kind}-servo-8", changes={key: row.pop(key) for key in vary})
         (figures,) = busplan.capacity(own, timing_model=row["timing_model"]).results

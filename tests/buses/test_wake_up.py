@@ -38,6 +38,10 @@ KINDS = (
     Kind("dynamixel-arm-14", "bus.master_jitter_us"),
 )
 EACH = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.profile)
+SLOW = ("gantry-24", "can-servo-8")  # the kind of dvrk, and one that has tests of its own
+SOME = pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind.profile in SLOW), id=kind.profile) for kind in KINDS]
+)
 
 
 def with_jitter(kind: Kind, us: float, cycles: int | None = None, **more: Any) -> busplan.Profile:
@@ -59,7 +63,7 @@ def test_every_kind_with_a_wake_up_is_here() -> None:
 
 
 @EACH
-@pytest.mark.parametrize("us", [1.0, 130.0, 400.0])
+@pytest.mark.parametrize("us", [pytest.param(1.0, marks=pytest.mark.slow), 400.0])
 def test_a_cycle_takes_as_much_longer_as_it_may_start_late(kind: Kind, us: float) -> None:
     punctual, late = (decided(with_jitter(kind, jitter)) for jitter in (0.0, us))
     assert late.required_us == pytest.approx(punctual.required_us + kind.share * us, rel=1e-12)
@@ -105,19 +109,18 @@ def test_commands_come_as_late_and_samples_scatter(kind: Kind) -> None:
     assert jitter_us(late) - jitter_us(punctual) == pytest.approx(0.0 if is_clocked else 200.0)
 
 
-@EACH
+@SOME
 def test_a_measured_worst_is_no_bound(kind: Kind) -> None:
     bound = decided(with_jitter(kind, 5.0, cycle__period_us=64_000.0))
     assert bound.verdict == "fits"
     measured: dict[str, Any] = {"cycles": 900_000, "cycle__period_us": 64_000.0}
-    found = decided(with_jitter(kind, 5.0, **measured))
-    assert (found.verdict, found.not_shown, found.exceeded) == ("not shown to fit", ("wake_up",), ())
     (verdict,) = busplan.capacity(with_jitter(kind, 5.0, **measured)).verdicts
+    found = verdict.deciding
+    assert (found.verdict, found.not_shown, found.exceeded) == ("not shown to fit", ("wake_up",), ())
     assert verdict.broken_limits == (f"{kind.key} = 5 is the worst of 900,000 measured cycles, no bound",)
     assert decided(with_jitter(kind, 0.0, **measured)).verdict == "fits"
-    accepted = with_jitter(kind, 5.0, **measured, limits__missed_cycles=1)
-    assert decided(accepted).verdict == "fits"
-    (verdict,) = busplan.capacity(accepted).verdicts
+    (verdict,) = busplan.capacity(with_jitter(kind, 5.0, **measured, limits__missed_cycles=1)).verdicts
+    assert verdict.deciding.verdict == "fits"
     first = verdict.rests_on[0]
     assert (first.key, first.words) == (beside(kind.key, "cycles"), "a wake-up measured, worst of 900,000 cycles")
     # No acceptance mends a cycle that does not fit even so.
@@ -125,15 +128,15 @@ def test_a_measured_worst_is_no_bound(kind: Kind) -> None:
     assert late.verdict == "does not fit"
 
 
-@EACH
+@SOME
 def test_a_grid_says_what_capacity_says(kind: Kind) -> None:
     profile = with_jitter(kind, 5.0, cycles=1000, cycle__period_us=64_000.0)
-    values = [0.0, 5.0, 200.0]
+    values = [0.0, 200.0]
     table = busplan.sweep(profile, vary={kind.key: values})
     said = [decided(busplan.load_profile(profile, changes={kind.key: value})).verdict for value in values]
     rows = table.to_dict()["rows"]
     assert [row["verdict"] for row in rows if row["verdict"]] == said
-    assert said == ["fits", "not shown to fit", "not shown to fit"]
+    assert said == ["fits", "not shown to fit"]
 
 
 def test_the_gate_reports_it_at_its_key(tmp_path: Path) -> None:
@@ -173,7 +176,7 @@ def test_the_hosts_are_those_that_were_measured() -> None:
     assert found == {name: (pytest.approx(1000 * (ms - 2)), 30 * 60 * 500) for name, ms in longest_ms.items()}
 
 
-@EACH
+@SOME
 def test_the_sensitivity_has_its_row(kind: Kind) -> None:
     (verdict,) = busplan.capacity(kind.profile, sensitivity=True).to_dict()["verdicts"]
     (row,) = [row for row in verdict["sensitivity"] if row["key"] == kind.key]

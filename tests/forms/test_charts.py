@@ -18,15 +18,17 @@ SVG = "{http://www.w3.org/2000/svg}"
 HOSTILE = '<b>$x_1$ & "q" ]]> </svg>機械'
 ANSWERS: Mapping[str, Callable[[], Any]] = {
     "map": lambda: busplan.map_("dvrk"),
-    "compare": lambda: busplan.compare("paper-1ms"),
+    "compare": lambda: busplan.compare("paper-1ms", buses=["can", "ethercat", "sercos2"]),
     "timeline": lambda: busplan.timeline("paper-1ms"),
     "transaction": lambda: busplan.timeline("paper-1ms", transaction="read:1"),
-    "sensitivity": lambda: busplan.capacity("gantry-24", sensitivity=True),
+    "sensitivity": lambda: busplan.capacity("paper-1ms", sensitivity=True),
     "curves": lambda: busplan.map_("paper-1ms", x={"bus.nodes": range(1, 17)}),
     "words": lambda: busplan.map_(
         "paper-1ms", x={"bus.gap_count": [5, 7, "optimal"]}, y={"cycle.period_us": range(250, 4001, 250)}
     ),
-    "circle": lambda: busplan.circle_test("dvrk", contributions=True),
+    "circle": lambda: busplan.circle_test(
+        busplan.load_profile("dvrk", changes={"circle.radius_mm": 40.0}), contributions=True
+    ),
 }
 EACH = pytest.mark.parametrize("name", ANSWERS)
 

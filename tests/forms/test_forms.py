@@ -283,10 +283,10 @@ def test_a_figure_below_zero_has_the_decimals_of_one_above(run: Callable[..., An
 
 
 def test_a_file_that_python_saves_speaks_of_no_option(run: Callable[..., Any], tmp_path: Path) -> None:
-    answer = busplan.compare("gantry-24")
+    answer = busplan.compare("paper-1ms", buses=["can"])
     for ending in ("md", "txt", "html"):
         answer.save(tmp_path / f"x.{ending}")
         text = (tmp_path / f"x.{ending}").read_text(encoding="utf-8")
         assert ("Not shown" in text, "--all" in text) == (True, False)
     assert "to_dict() has all figures." in str(answer)
-    assert "--all shows all." in run("compare", "gantry-24", "--format", "markdown").stdout
+    assert "--all shows all." in run("compare", "paper-1ms", "--buses", "can", "--format", "markdown").stdout

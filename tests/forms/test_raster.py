@@ -53,7 +53,7 @@ def test_a_picture_is_the_same_on_every_computer(monkeypatch: pytest.MonkeyPatch
     svg = busplan.timeline("paper-4ms").svg()
     here = png(svg)
     monkeypatch.setattr(resvg_py, "svg_to_bytes", partial(resvg_py.svg_to_bytes, skip_system_fonts=True))
-    assert png(svg) == here == png(svg)
+    assert png(svg) == here
 
 
 def test_a_character_that_no_font_has_is_a_box() -> None:
@@ -100,8 +100,8 @@ def test_a_curve_has_its_light_colour_and_a_file_no_variable() -> None:
 
 
 def test_a_very_high_picture_has_fewer_pixels() -> None:
-    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="100%" height="32000"><rect width="9" height="9"/></svg>'
-    assert pixels(svg).shape == (16000, 320, 3)
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="100%" height="128000"><rect width="9" height="9"/></svg>'
+    assert pixels(svg).shape == (16000, 80, 3)
 
 
 def test_text_that_looks_like_a_variable_stays_text() -> None:

@@ -112,8 +112,7 @@ def test_a_large_or_binary_file_is_judged_by_its_beginning(collect: Collect) -> 
 def test_shipped_names_mean_the_shipped_profiles_whatever_lies_here(collect: Collect) -> None:
     Path("paper-1ms").mkdir()
     write("paper-1ms/a.toml", "paper-4ms")
-    for name in SHIPPED:
-        assert names(collect([name])) == [f"{name}.toml"]
+    assert names(collect(SHIPPED)) == [f"{name}.toml" for name in SHIPPED]
     assert names(collect(["./paper-1ms", "./paper-4ms"])) == ["paper-1ms/a.toml", "paper-4ms"]
 
 

@@ -523,7 +523,7 @@ def validator(schema: dict[str, Any]) -> Any:
 
 
 def test_the_profile_schema_accepts_what_is_shipped_and_what_only_the_gate_finds(validator: Any) -> None:
-    examples = [path for path in EXAMPLES.glob("*/*.toml") if not path.parent.name.startswith("BP0")]
+    examples = [path for path in EXAMPLES.glob("*/invalid*.toml") if not path.parent.name.startswith("BP0")]
     for path in (*(ROOT / "profiles").glob("*.toml"), *examples):
         validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
 

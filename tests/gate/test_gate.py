@@ -231,6 +231,7 @@ def test_severities_decide_what_fails(clean: str, changed: Changed, gate: Check)
     assert (warned.passed, failed.passed) == (True, False)
 
 
+@pytest.mark.slow
 def test_without_a_circle_no_numpy_is_loaded() -> None:
     code = (
         "import sys; from busplan.__main__ import main\n"

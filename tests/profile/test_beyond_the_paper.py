@@ -117,7 +117,7 @@ def test_the_gate_names_the_limit_and_the_way_out(busplan: Run, own: Path) -> No
     assert "reduce bus.isochronous_us, or stop the cycle master" in done.stdout
 
 
-@pytest.mark.parametrize("line", ["cycle_master = true", "retries = 1_000_000"])
+@pytest.mark.parametrize("line", ["cycle_master = true", pytest.param("retries = 1_000_000", marks=pytest.mark.slow)])
 def test_a_timeline_of_millions_of_events_is_refused_at_once(busplan: Run, own: Path, line: str) -> None:
     text = TEXT.replace("period_us = 4000", "period_us = 1e9").replace("nonperiodic_us = 0", "nonperiodic_us = 4e8")
     header = "[bus]" if line.startswith("cycle") else "[cycle]"

@@ -240,8 +240,8 @@ def test_deep_nesting_costs_no_recursion() -> None:
 
 
 def test_a_long_array_is_read_to_its_end() -> None:
-    text = f"a = [{'1, ' * 50_000}]"
-    assert places(text)["a", 49_999] == Place(150_002, 150_003, 150_002, 150_003)
+    text = f"a = [{'1, ' * 5000}]"
+    assert places(text)["a", 4999] == Place(15_002, 15_003, 15_002, 15_003)
 
 
 def test_text_that_is_no_toml_ends_in_an_error_and_not_in_a_loop() -> None:

@@ -176,7 +176,7 @@ NEW_NAMES = ("mine", "[bold]x", 'say "hi"', "back\\slash\\", "größe", "'", "x"
 def test_a_copy_differs_from_its_source_in_the_name_and_in_what_the_gate_was_told(
     source: str, run: Run, work: Path
 ) -> None:
-    for name in NEW_NAMES[:: 1 if source == "paper-4ms" else 7]:
+    for name in NEW_NAMES[0 if source == "paper-4ms" else -1 :]:
         assert run("init", name, "--from", source, cwd=work).returncode == 0
         text = (work / f"{name}.toml").read_text(encoding="utf-8")
         schema, editor, copied, text_below = text.split("\n", 3)

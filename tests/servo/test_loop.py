@@ -1,8 +1,9 @@
-"""The linear loop: simulated, in closed form, and by python-control and scipy."""
+"""The linear loop: simulated, by its states, in closed form, and by python-control."""
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,11 +17,8 @@ from busplan.servo.margins import loop_margins
 from busplan.servo.parameters import Axis, Delivery, LoopTiming
 from tests.extras import needed
 
-if TYPE_CHECKING:
-    import control
-
 Floats = NDArray[np.float64]
-Loop = Callable[[Axis, LoopTiming], "control.StateSpace"]
+Loop = Callable[[Axis, LoopTiming], Any]
 
 CONTROLLERS: list[dict[str, float]] = [
     {"position_gain_per_s": 100.0},
@@ -33,6 +31,13 @@ NODE = LoopTiming(period_us=500.0, step_us=500.0)
 HOST = LoopTiming(period_us=1000.0, step_us=250.0, loop="host")
 PLACES = [(NODE, 0.0), (HOST, 0.0), (HOST, 317.0), (HOST, 1000.0), (HOST, 2317.0)]
 """Timing, and delay of the axis."""
+LOOPS = [
+    (controller, *place)
+    for row, controller in enumerate(CONTROLLERS)
+    for column, place in enumerate(PLACES)
+    if (row + column) % 2 == 0
+]
+"""Each controller at three places or two, and each place with as many controllers."""
 
 
 def an_axis(**changes: Any) -> Axis:
@@ -41,48 +46,25 @@ def an_axis(**changes: Any) -> Axis:
     return Axis(**(values | changes))
 
 
-def response(loop: "control.LTI", frequency_hz: Floats) -> NDArray[np.complex128]:
-    return np.asarray(loop(np.exp(2j * math.pi * frequency_hz * loop.dt)))
-
-
-def all_at_once(loop: "control.StateSpace", frequency_hz: Floats) -> NDArray[np.complex128]:
-    """The response at many frequencies, which python-control solves one by one."""
-    z = np.exp(2j * math.pi * frequency_hz * loop.dt)[:, None, None]
-    states = np.linalg.solve(z * np.eye(len(loop.A)) - loop.A, np.broadcast_to(loop.B, (len(z), *loop.B.shape)))
-    return np.asarray((loop.C @ states + loop.D)[:, 0, 0])
-
-
-# --- simulated against python-control ------------------------------------------------------------------------
+# --- simulated against its states -----------------------------------------------------------------------------
 
 
 def test_the_simulated_frequency_response_is_the_loops(reference_loop: Loop) -> None:
-    for controller, timing, delay_us, cycles_per_wave in [
-        (controller, *place, (50, 200)[(row + column) % 2])
-        for row, controller in enumerate(CONTROLLERS)
-        for column, place in enumerate(PLACES)
-    ]:
-        axis, cycles = an_axis(**controller, delay_us=delay_us), 8000
+    for (controller, timing, delay_us), cycles_per_wave in zip(LOOPS, cycle([50, 200]), strict=False):
+        axis, cycles = an_axis(**controller, delay_us=delay_us), 4000
         wave = np.exp(2j * math.pi * np.arange(cycles + 1) / cycles_per_wave)
         real, imaginary = (simulate_axis(part.copy(), axis=axis, timing=timing) for part in (wave.real, wave.imag))
         # At the end of the last period a host aims at the last set-point, a node at the one before.
         aimed = wave[-1] if timing.loop == "host" else wave[-2]
-        gain = response(reference_loop(axis, timing), np.array([1e6 / timing.period_us / cycles_per_wave]))[0]
+        (gain,) = reference_loop(axis, timing).at(1e6 / timing.period_us / cycles_per_wave)
         assert (real[-1] + 1j * imaginary[-1]) / aimed == pytest.approx(gain / (1 + gain), rel=1e-6)
 
 
 # --- formulas against python-control -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("controller", "timing", "delay_us"),
-    # Each controller at three places or two, and each place with as many controllers.
-    [
-        (controller, *place)
-        for row, controller in enumerate(CONTROLLERS)
-        for column, place in enumerate(PLACES)
-        if (row + column) % 2 == 0
-    ],
-)
+@pytest.mark.slow  # as the next one, it loads python-control
+@pytest.mark.parametrize(("controller", "timing", "delay_us"), LOOPS)
 def test_the_margins_are_python_controls(
     reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, delay_us: float
 ) -> None:
@@ -92,8 +74,10 @@ def test_the_margins_are_python_controls(
     # Sampled finely: its polynomials in z lose too many digits for these loops, and it says so.
     frequency_hz = np.geomspace(0.01, 0.5e6 / timing.control_period_us, 1000)
     loop = reference_loop(axis, timing)
-    gains = all_at_once(loop, frequency_hz)
-    np.testing.assert_allclose(gains[::100], response(loop, frequency_hz[::100]), rtol=1e-10)
+    gains = loop.at(frequency_hz)
+    same = control.ss(loop.a, loop.b[:, None], loop.c, loop.d, loop.period_s)
+    z = np.exp(2j * math.pi * frequency_hz[::100] * loop.period_s)
+    np.testing.assert_allclose(gains[::100], same(z), rtol=1e-10)
     sampled = control.frd(gains, 2 * math.pi * frequency_hz)
     gain, phase_deg, _, _, crossover, _ = control.stability_margins(sampled)
     # It looks for changes of sign only; at half the control rate the phase arrives at -180 degrees without one.
@@ -105,6 +89,7 @@ def test_the_margins_are_python_controls(
     assert found.crossover_hz == pytest.approx(crossover / (2 * math.pi), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kp", [20.0, 143.0, 400.0, 1500.0])
 @pytest.mark.parametrize("lag_us", [0.0, 3000.0, 20_000.0])
 def test_a_host_that_is_one_period_late_is_python_controls_own_sampling_and_a_delay(kp: float, lag_us: float) -> None:
@@ -120,7 +105,7 @@ def test_a_host_that_is_one_period_late_is_python_controls_own_sampling_and_a_de
     frequency_hz = np.geomspace(0.1, 500.0, 1000)
     # Its default way warns of lost digits.
     gain, phase_deg, _, crossover = control.margin(
-        control.frd(response(loop, frequency_hz), 2 * math.pi * frequency_hz)
+        control.frd(loop(np.exp(2j * math.pi * frequency_hz * period_s)), 2 * math.pi * frequency_hz)
     )
     assert found.settling_us == pytest.approx(1000 * math.log(1e-3) / math.log(slowest), rel=1e-6)
     assert found.phase_margin_deg == pytest.approx(phase_deg, rel=1e-5)
@@ -169,7 +154,7 @@ delays = st.one_of(st.sampled_from([0.0, 1000.0, 2000.0]), st.floats(0, 1000), s
 def test_stability_is_where_the_poles_are(reference_loop: Loop, plant: dict[str, float], delay_us: float) -> None:
     axis, timing = an_axis(**plant, delay_us=delay_us), HOST
     loop = reference_loop(axis, timing)
-    radius = np.abs(np.linalg.eigvals(loop.A - loop.B @ loop.C / (1 + loop.D[0, 0]))).max()
+    radius = np.abs(np.linalg.eigvals(loop.a - np.outer(loop.b, loop.c) / (1 + loop.d))).max()
     assume(abs(radius - 1) > 1e-9)
     found = loop_margins(axis, timing=timing)
     assert found.stable == (radius < 1)
@@ -193,7 +178,7 @@ def test_no_crossover_is_missed(reference_loop: Loop, plant: dict[str, float], d
     assume(found.stable)
     frequency_hz = np.geomspace(1e-5, 500.0, 20_000)
     loop = reference_loop(axis, timing)
-    gain = all_at_once(loop, frequency_hz)
+    gain = loop.at(frequency_hz)
     size = np.abs(gain)
     passes = np.flatnonzero((size[:-1] > 1) != (size[1:] > 1))
     turns = np.abs(np.degrees(np.angle(-gain)))
@@ -201,7 +186,7 @@ def test_no_crossover_is_missed(reference_loop: Loop, plant: dict[str, float], d
     if searched:
         assert found.phase_margin_deg == pytest.approx(min(searched), abs=0.5)
         assert found.crossover_hz is not None
-        (at,) = all_at_once(loop, np.array([found.crossover_hz]))
+        (at,) = loop.at(found.crossover_hz)
         assert abs(at) == pytest.approx(1, abs=1e-6)
         assert abs(math.degrees(np.angle(-at))) == pytest.approx(found.phase_margin_deg, abs=1e-6)
     opposed = np.flatnonzero((gain.imag[:-1] > 0) != (gain.imag[1:] > 0))

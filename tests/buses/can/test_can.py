@@ -64,7 +64,7 @@ def test_its_cycle_is_that_by_hand() -> None:
     assert terms(profile(bus__identifier_bits=29))["command"] == 3 * 140 * BIT_US
 
 
-@pytest.mark.parametrize("load", [0.5, 0.975, 0.985, 0.9895, 0.9905, 0.995, 0.9998, 1.0, 1.2])
+@pytest.mark.parametrize("load", [0.5, 0.985, 0.9895, 0.9905, 0.9998, 1.0, 1.2])
 def test_a_cycle_behind_a_nearly_full_bus_is_a_bound_in_closed_form(load: float) -> None:
     # One message goes before all PDOs, and one behind them may block: three frames of it, in a cycle so long.
     frame, period_us, others = 135 * BIT_US, 135 * BIT_US / load, (55 + 3 * (135 + 75) + 3 * 115) * BIT_US
@@ -363,7 +363,7 @@ def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None
     assert done.stderr.startswith("--bus lon: no kind of bus; there are ieee1394, can")
 
 
-@pytest.mark.parametrize("nodes", [12, 20, 28])
+@pytest.mark.parametrize("nodes", [12, 28])
 def test_a_plan_holds_load_deadlines_and_time(nodes: int) -> None:
     many = busplan.load_profile("can-servo-8", changes={"bus.nodes": nodes})
     found = busplan.plan(many)
@@ -379,15 +379,13 @@ def test_no_plan_is_made_where_no_period_keeps_a_deadline() -> None:
     assert "the worst-case response time of sdo-response is" in str(found)
 
 
-@pytest.mark.parametrize("nodes", [8, 12, 20])
+@pytest.mark.parametrize("nodes", [8, 20])
 def test_the_smallest_period_keeps_the_load(nodes: int) -> None:
     many = busplan.load_profile("can-servo-8", changes={"bus.nodes": nodes})
-    smallest_us = busplan.capacity(many).results[0].safe_min_period_us or 0.0
-    at, _ = busplan.capacity(busplan.load_profile(many, changes={"cycle.period_us": smallest_us})).results
+    smallest_us = figures(many).safe_min_period_us or 0.0
+    at = figures(busplan.load_profile(many, changes={"cycle.period_us": smallest_us}))
     assert (at.verdict, at.exceeded) == ("fits", ())
-    below, _ = busplan.capacity(
-        busplan.load_profile(many, changes={"cycle.period_us": smallest_us * (1 - 1e-6)})
-    ).results
+    below = figures(busplan.load_profile(many, changes={"cycle.period_us": smallest_us * (1 - 1e-6)}))
     assert below.verdict != "fits"
 
 

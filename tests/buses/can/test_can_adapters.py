@@ -86,9 +86,8 @@ def test_a_host_with_cycles_of_its_own_has_the_adapter_in_the_loop_alone(adapter
     ],
 )
 def test_the_circle_has_the_loop_of_latency(update: str, bus: dict[str, Any]) -> None:
-    own = busplan.load_profile(
-        machine(**bus), changes={"servo.loop": "host", "servo.update": update, "servo.position_gain_per_s": 5.0}
-    )
+    servo = {"servo.loop": "host", "servo.update": update, "servo.position_gain_per_s": 5.0}
+    own = busplan.load_profile(machine(**bus), changes={**servo, "circle.radius_mm": 2.0})
     # Of a burst the command has arrived before the answers.
     answers_us = 4 * 95 + READ_US if bus.get("access") == "burst" else 0
     assert busplan.circle_test(own).results[0].delay_y_us + answers_us == responses(own)["loop"]
@@ -144,7 +143,7 @@ def test_a_log_holds_the_adapter_and_the_host_in_one(run: Run, tmp_path: Path) -
     (tmp_path / "slow.toml").write_text(text_of(slow))
     (tmp_path / "line.toml").write_text(text_of(machine(**GIVEN)))
     log = tmp_path / "bus.log"
-    assert run("emulate", "slow.toml", "--output", log.name, cwd=tmp_path).returncode == 0
+    assert run("emulate", "slow.toml", "--cycles", "200", "--output", log.name, cwd=tmp_path).returncode == 0
     log.write_text(re.sub(r"\) \S+ ", ") can0 ", log.read_text()))
     assert run("check", "slow.toml", "--recording", log.name, cwd=tmp_path).returncode == 0
     done = run("check", "line.toml", "--recording", log.name, cwd=tmp_path)

@@ -168,7 +168,7 @@ MESSAGES = st.lists(
 
 
 @given(MESSAGES, st.sampled_from([125, 500]))
-@settings(max_examples=at_least(30))
+@settings(max_examples=at_least(15))
 def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
     messages: list[dict[str, Any]], rate: float
 ) -> None:
@@ -269,7 +269,7 @@ def test_a_message_without_a_deadline_blocks_as_one_that_may_be_late_for_ever() 
     for name in ("can-servo-8", "can-motors-8"):
         message = {"name": "slow", "identifier": 0x7F0, "payload_bytes": 8, "period_us": 50_000.0}
         us = []
-        for deadline_us in (1000.0, 1e6, 1e9, "none"):
+        for deadline_us in (1000.0, 1e9, "none"):
             data: Any = busplan.load_profile(name).model_dump(exclude_unset=True)
             data["message"] = [{**message, "deadline_us": deadline_us}]
             us.append(figures(loaded(data)).required_us)
@@ -302,6 +302,7 @@ OF_BITS = {
 }
 
 
+@settings(max_examples=at_least(5))
 @given(
     messages=st.lists(st.one_of(*OF_BITS.values()), min_size=1, max_size=4),
     bits=st.sampled_from([11, 29]),
@@ -357,7 +358,7 @@ def test_messages_that_all_say_their_11_bits_are_answered_on_a_bus_of_29() -> No
 
 
 def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
-    rates, deadlines_us = [20.0, 33.3, 50.0, 125.0], [5000.0, 10_000.0, 50_000.0]
+    rates, deadlines_us = [33.3, 125.0], [5000.0, 50_000.0]
     vary = {"bus.bit_rate_kbit_s": rates, "message.doors.deadline_us": deadlines_us}
     rows = busplan.sweep(car(), vary=vary).to_dict()["rows"]
     pictured = busplan.map_(car(), x={"bus.bit_rate_kbit_s": rates}, y={"message.doors.deadline_us": deadlines_us})

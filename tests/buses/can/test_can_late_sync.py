@@ -153,7 +153,7 @@ def test_a_log_of_late_syncs_shows_the_key_that_plans_them(run: Run, tmp_path: P
     (tmp_path / "late.toml").write_text(PLAN.replace("sync_jitter_us = 0", "sync_jitter_us = 20"))
     (tmp_path / "line.toml").write_text(PLAN)
     log = tmp_path / "bus.log"
-    assert run("emulate", "late.toml", "--output", log.name, cwd=tmp_path).returncode == 0
+    assert run("emulate", "late.toml", "--cycles", "200", "--output", log.name, cwd=tmp_path).returncode == 0
     # As if a machine had sent it.
     log.write_text(re.sub(r"\) \S+ ", ") can0 ", log.read_text()))
     assert run("check", "late.toml", "--recording", log.name, cwd=tmp_path).returncode == 0

@@ -61,16 +61,16 @@ def test_many_messages_are_answered(run: Run, tmp_path: Path, line: str, count: 
 
 @pytest.mark.parametrize(("load", "slow", "seed"), [(0.995, 0.9, 1), (0.9998, 0.8, 4)])
 def test_a_bus_that_is_nearly_full_is_answered(load: float, slow: float, seed: int) -> None:
-    profile = many(200, load=load, slow=slow, seed=seed)
+    profile = many(60, load=load, slow=slow, seed=seed)
     assert busplan.capacity(profile).report().blocks
     found = busplan.latency(profile, timing_model=["worst-stuffing"])
-    assert len(found.transactions) == 204
+    assert len(found.transactions) == 64
 
 
 def test_a_response_that_takes_too_many_steps_is_not_computed_and_said() -> None:
     random = Random(3)
-    periods_us = [random.uniform(27_000, 54_000) for _ in range(300)]
-    scale = sum(135 / us for us in periods_us) / 0.99985
+    periods_us = [random.uniform(27_000, 54_000) for _ in range(30)]
+    scale = sum(135 / us for us in periods_us) / 0.9999
     each = [
         {"name": f"m{number}", "identifier": number, "payload_bytes": 8, "period_us": us}
         for number, us in enumerate([*(us * scale for us in periods_us), 1e9])
@@ -78,8 +78,8 @@ def test_a_response_that_takes_too_many_steps_is_not_computed_and_said() -> None
     bus = {"kind": "can", "bit_rate_kbit_s": 1000}
     own = loaded({"schema_version": 1, "name": "full", "bus": bus, "message": each})
     answers = phases(own)
-    assert answers["m300"]["worst_response_us"] is None
-    assert answers["m100"]["worst_response_us"] is not None
+    assert answers["m30"]["worst_response_us"] is None
+    assert answers["m10"]["worst_response_us"] is not None
     said = [one.finding.message for one in busplan.check(own).findings]
     assert any("its busy period takes over 2000 steps to find" in words for words in said)
 

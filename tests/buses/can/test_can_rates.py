@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
-from tests.buses.can.machines import WORST, figures, loaded, responses, terms, text_of
+from tests.buses.can.machines import WORST, figures, loaded, responses, text_of
 
 
 def group(name: str, nodes: int, *, size: int = 8, axes: int = 1, **keys: Any) -> dict[str, Any]:
@@ -57,10 +57,10 @@ def test_the_load_is_that_of_all_cycles_of_the_common_multiple(rates: tuple[int,
 
 def test_the_fullest_cycle_decides() -> None:
     slow, fast = mixed(every=4), mixed(every=1)
-    for model in (WORST, "no-stuffing"):
-        assert terms(slow, model) == terms(fast, model)
-        assert load(slow, model) < load(fast, model)
-    one, other = figures(slow), figures(fast)
+    for model in ("no-stuffing", WORST):
+        one, other = figures(slow, model), figures(fast, model)
+        assert [term.us for term in one.terms] == [term.us for term in other.terms]
+        assert one.own.bus_load < other.own.bus_load
     assert (one.margin_us, one.uncertainty_us) == (other.margin_us, other.uncertainty_us)
 
 
@@ -97,15 +97,11 @@ def test_slow_pdos_go_before_a_message_less_often() -> None:
 def test_more_nodes_fit_where_they_are_seldom_due() -> None:
     own = busplan.load_profile(mixed(every=4), changes={"limits.max_load": 0.5})
     for every, fits in ((4, True), (1, False)):
-        found = busplan.capacity(busplan.load_profile(own, changes={"group.io.every": every})).results[0]
+        found = figures(busplan.load_profile(own, changes={"group.io.every": every}))
         assert ("load" not in found.exceeded) is fits
-    most = next(
-        nodes
-        for nodes in range(1, 40)
-        if busplan.capacity(busplan.load_profile(own, changes={"group.io.nodes": nodes + 1})).results[0].verdict
-        != "fits"
-    )
-    assert {each.name: each.safe_nodes for each in busplan.capacity(own).results[0].groups}["io"] == most
+    most = {each.name: each.safe_nodes for each in figures(own).groups}["io"]
+    for nodes, fits in ((most, True), (most + 1, False)):
+        assert (figures(busplan.load_profile(own, changes={"group.io.nodes": nodes})).verdict == "fits") is fits
 
 
 def test_no_cycle_lasts_longer_than_the_fullest() -> None:

@@ -210,7 +210,7 @@ def attacked(arm: Arm, random: Random, *, rounds: int = 12) -> tuple[float, floa
     return most / 10, required_us
 
 
-@pytest.mark.parametrize("seed", range(at_least(15)))
+@pytest.mark.parametrize("seed", range(at_least(5)))
 def test_no_simulated_cycle_and_no_response_is_longer_than_its_bound(seed: int) -> None:
     random = Random(seed)
     attacked(drawn_arm(random), random)
@@ -242,7 +242,7 @@ def test_a_cycle_is_the_sum_of_its_parts(way: str) -> None:
 
 @pytest.mark.parametrize(("way", "number"), [("polled", 6), ("burst", 2)])
 def test_so_many_frames_of_a_lower_priority_block(way: str, number: int) -> None:
-    lower = Message(0x700, 8, 140)
+    lower = Message(0x700, 8, 200)
     blocked = terms(loaded(Arm(3, way, exec_us=50, messages=(lower,)).data(10_000, bit_rate_kbit_s=1000)))
     assert blocked["blocking"] == number * 135
 

@@ -107,7 +107,7 @@ MESSAGES: Final = st.lists(
 
 @pytest.mark.parametrize("form", FORMS)
 @given(messages=MESSAGES)
-@settings(max_examples=at_least(30))
+@settings(max_examples=at_least(15))
 def test_a_simulation_reaches_each_response_and_never_passes_it(messages: list[dict[str, Any]], form: str) -> None:
     # Data at 1000 kbit/s: all frames are whole microseconds, with a switch of bit rate and without.
     found = latencies(network(*messages, data_bit_rate_kbit_s=1000), form=form)
@@ -160,7 +160,7 @@ def random_network(random: Random, *, count: int, load: float) -> Any:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(at_least(3)))
 def test_networks_have_the_responses_of_the_printed_equations(seed: int, form: str) -> None:
     random = Random(seed)
     own = random_network(random, count=random.randint(2, 40), load=random.choice([0.3, 0.7, 0.95, 1.05]))
@@ -189,7 +189,7 @@ def test_networks_have_the_responses_of_the_printed_equations(seed: int, form: s
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("sizes", [(8, 8), (0, 8)], ids=["alike", "unlike"])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(at_least(3)))
 def test_repeated_frames_take_what_tindell_and_burns_print(seed: int, sizes: tuple[int, int], form: str) -> None:
     random = Random(seed)
     messages = [
@@ -235,7 +235,7 @@ def test_a_burst_of_errors_asks_for_their_period() -> None:
         network({"period_us": 1000}, error_burst=2)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(at_least(2)))
 def test_both_forms_give_the_same_floats(seed: int) -> None:
     own = random_network(Random(seed), count=60, load=0.9)
     first, second = (latencies(own, form=form) for form in FORMS)
@@ -243,7 +243,7 @@ def test_both_forms_give_the_same_floats(seed: int) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("data_bytes", [(), (2,), (0, 8), (5, 3, 1), (1, 8, 2, 4)])
+@pytest.mark.parametrize("data_bytes", [(), (2,), (0, 8), (1, 8, 2, 4)])
 def test_a_cycle_waits_for_the_three_longest_frames_behind_it(data_bytes: tuple[int, ...], form: str) -> None:
     behind = [
         {"name": f"m{size}", "identifier": 0x7F0 + size, "payload_bytes": size, "period_us": 1e6, "deadline_us": 1e5}

@@ -9,10 +9,11 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import pytest
-from hypothesis import given, target
+from hypothesis import given, settings, target
 from hypothesis import strategies as st
 
 import busplan
+from tests.registers import at_least
 
 ROUNDING_US = 1e-6
 RATES = {"S100": 98.304, "S200": 196.608, "S400": 393.216}
@@ -210,6 +211,7 @@ def allowance_us(case: Case, simulated: ModuleType) -> float:
 
 @pytest.mark.parametrize("alone", [False, True])
 def test_the_bus_never_takes_longer_than_the_closed_form(simulated: ModuleType, *, alone: bool) -> None:
+    @settings(max_examples=at_least(5))
     @given(cases(alone=alone))
     def holds(case: Case) -> None:
         above_us = allowance_us(case, simulated)

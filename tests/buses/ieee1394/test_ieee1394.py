@@ -73,7 +73,7 @@ def test_published_machines_fit_their_periods() -> None:
 
 
 def test_a_command_that_is_executed_beside_the_bus_counts_as_it_is_executed() -> None:
-    host = {"servo.loop": "host", "cycle.period_us": 1000.0, "servo.step_us": 100.0}
+    host = {"servo.loop": "host", "cycle.period_us": 1000.0, "servo.step_us": 100.0, "circle.radius_mm": 1.0}
 
     def delay_us(update: str, **changes: object) -> float:
         changed = {**host, "servo.update": update, **{key.replace("__", "."): us for key, us in changes.items()}}

@@ -1,6 +1,5 @@
 """The adapter of a polled bus beside an event simulation, and at its ends by hand."""
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,9 +16,7 @@ from busplan.buses.polled.cycle import PolledCycle
 from busplan.profile.document import decode, validate
 from busplan.questions.fit.network import network_of
 from tests.oracles.adapter_simulation import Adapter, Exchange, cycle_us, shares
-
-SEEDS = int(os.environ.get("ADAPTER_SEEDS", "0"))
-"""Number of random buses in a run by hand."""
+from tests.registers import at_least
 
 OWN = """[bus.protocol]
 bits_per_byte = 12
@@ -195,12 +192,12 @@ def test_a_cycle_is_never_outside_its_ends(seed: int) -> None:
 
 def test_both_ends_are_reached() -> None:
     is_near_least = is_near_most = 0
-    for seed in range(SEEDS or 200):
+    for seed in range(at_least(50)):
         least_us, simulated_us, most_us = place(seed)
         if most_us > 1.05 * least_us:
             is_near_least += simulated_us < 1.02 * least_us
             is_near_most += simulated_us > 0.98 * most_us
-    assert min(is_near_least, is_near_most) >= (SEEDS or 200) / 50, (is_near_least, is_near_most)
+    assert min(is_near_least, is_near_most) >= at_least(1), (is_near_least, is_near_most)
 
 
 ABOVE = {"read and write of one servo, optimised", "fast sync read and write, optimised"}

@@ -89,7 +89,7 @@ def library_margin_us(method: str, *, devices: int, least_us: float, ucc_us: flo
 
 def test_each_method_is_what_the_library_asks() -> None:
     for method in ["mdt-at-ucc", "mdt-ucc-at", "at-last"]:
-        for least_us in [0.0, 40.0, 100.0, 230.0]:
+        for least_us in [0.0, 100.0, 230.0]:
             for devices, ucc_us in [(3, 125.0), (40, 125.0), (40, 0.0)]:
                 changes: dict[str, Any] = {
                     "bus__timing_method": method,
