@@ -306,7 +306,8 @@ def run(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
         if python is not None:
             options["program"] = (sys.executable, *python)
         if options or env is not None:
-            options.setdefault("program", (request.getfixturevalue("program"),))
+            if "program" not in options:
+                options["program"] = (request.getfixturevalue("program"),)
             return run_busplan(*arguments, cwd=cwd or home, stdin=stdin, env=env, **options)  # type: ignore[arg-type]
         if cwd is not None or stdin is not None or inside is not None:
             return run_inside(*arguments, cwd=cwd or home, stdin=stdin, **(inside or {}))
