@@ -4,7 +4,7 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import chdir
 from functools import partial
 from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
@@ -41,8 +41,10 @@ settings.register_profile("thorough", EASY, max_examples=500)
 settings.load_profile("quick")
 
 
-collect_ignore = ["oracles", "readme/refresh.py"]
-"""Modules without a test or a doctest, which would load their libraries in every worker."""
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Tests have no doctests: nothing is searched for them, and no helper is loaded, in every worker."""
+    return [found for found in (yield) if type(found) is pytest.Module]
 
 
 def run_git(*arguments: str, cwd: Path) -> bytes:
