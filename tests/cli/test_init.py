@@ -136,7 +136,7 @@ def answered(program: Path, folder: Path, *answers: bytes, arguments: tuple[str,
     leader, follower = pty.openpty()
     # The terminal of a session of its own, so that Ctrl-C reaches the program, also where the tests ignore it.
     env = {**os.environ, "FORK_FIRST": "import os; os.login_tty(0); os.write(1, b'%d ' % os.getpid())"}
-    command = [program, "init", "asked", *arguments]
+    command = [str(program), "init", "asked", *arguments]
     process = subprocess.Popen(command, cwd=folder, stdin=follower, stdout=follower, stderr=follower, env=env)
     os.close(follower)
     said = ""
