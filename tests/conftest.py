@@ -4,7 +4,7 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import chdir
 from functools import partial
 from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
@@ -41,8 +41,10 @@ settings.register_profile("thorough", EASY, max_examples=500)
 settings.load_profile("quick")
 
 
-collect_ignore = ["oracles", "readme/refresh.py"]
-"""Modules without a test or a doctest, which would load their libraries in every worker."""
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Tests have no doctests: nothing is searched for them, and no helper is loaded, in every worker."""
+    return [found for found in (yield) if type(found) is pytest.Module]
 
 
 def run_git(*arguments: str, cwd: Path) -> bytes:
@@ -306,7 +308,8 @@ def run(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
         if python is not None:
             options["program"] = (sys.executable, *python)
         if options or env is not None:
-            options.setdefault("program", (request.getfixturevalue("program"),))
+            if "program" not in options:
+                options["program"] = (request.getfixturevalue("program"),)
             return run_busplan(*arguments, cwd=cwd or home, stdin=stdin, env=env, **options)  # type: ignore[arg-type]
         if cwd is not None or stdin is not None or inside is not None:
             return run_inside(*arguments, cwd=cwd or home, stdin=stdin, **(inside or {}))

@@ -10,6 +10,17 @@ import pytest
 Busplan = Callable[..., Any]
 
 
+@pytest.fixture(scope="module")
+def folder(busplan: Busplan, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two new profiles, and one with a comma in a number."""
+    folder = tmp_path_factory.mktemp("advice")
+    for options in (("a", "--bus", "ethercat", "--axes", "8"), ("g", "--bus", "firewire", "--axes", "26")):
+        assert busplan("init", *options, "--nodes", "8", "--period", "1ms", cwd=folder).returncode == 0
+    text = re.sub(r"(?m)^period_us = .*", "period_us = 1,5", (folder / "a.toml").read_text(encoding="utf-8"))
+    (folder / "comma.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -27,12 +38,8 @@ Busplan = Callable[..., Any]
         (("sweep", "a.toml", "--vary", "cycle.period_us=250:1000:*2us"), "'2us' is not a number"),
     ],
 )
-def test_the_right_words_are_named(busplan: Busplan, tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
-    for options in (("a", "--bus", "ethercat", "--axes", "8"), ("g", "--bus", "firewire", "--axes", "26")):
-        assert busplan("init", *options, "--nodes", "8", "--period", "1ms", cwd=tmp_path).returncode == 0
-    text = re.sub(r"(?m)^period_us = .*", "period_us = 1,5", (tmp_path / "a.toml").read_text(encoding="utf-8"))
-    (tmp_path / "comma.toml").write_text(text, encoding="utf-8")
-    done = busplan(*arguments, cwd=tmp_path)
+def test_the_right_words_are_named(busplan: Busplan, folder: Path, arguments: tuple[str, ...], words: str) -> None:
+    done = busplan(*arguments, cwd=folder)
     assert (done.returncode, done.stdout) == (2, "")
     assert words in done.stderr
 

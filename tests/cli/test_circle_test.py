@@ -158,8 +158,8 @@ def test_a_broken_resvg_is_said_before_the_simulation(run: Run, profile: Path) -
     package = profile.parent / "broken" / "resvg_py"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("raise RuntimeError('wrong ABI')", encoding="utf-8")
-    broken = ("-c", "import sys; sys.path.insert(0, 'broken'); from busplan.__main__ import main; main()")
-    done = run("circle-test", profile.name, "-o", "c.png", cwd=profile.parent, python=broken)
+    broken = {"FORK_FIRST": "import sys; sys.path.insert(0, 'broken')"}
+    done = run("circle-test", profile.name, "-o", "c.png", cwd=profile.parent, env=broken)
     assert done.returncode == 2
     assert "does not load (RuntimeError: wrong ABI)" in done.stderr
     assert not (profile.parent / "c.png").exists()

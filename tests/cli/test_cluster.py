@@ -7,15 +7,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from busplan import __version__
-from tests.extras import needed
 
-needed("distributed")
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="needs distributed: the extra test-all has it")
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

@@ -3,36 +3,22 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import busplan
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    """The program in a process of its own, with a variable of the environment that changed figures once."""
-    command = [sys.executable, "-c", "from busplan.__main__ import main; main()", *arguments]
-    return subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={"PYTHONPATH": str(SOURCE), "BUSPLAN_CONSTANTS": "ARBITRATION_HOLD_US=99;GAPS_TICKS=abc"},
+def test_the_paper_s_hold_time_is_changed_everywhere(run: Run) -> None:
+    plain, changed = (
+        json.loads(run("capacity", "paper-4ms", "--format", "json", *options).stdout)
+        for options in ((), ("--set", "constants.arbitration_hold_us=2.63"))
     )
-
-
-def result(*options: str) -> Any:
-    done = run("capacity", "paper-4ms", "--format", "json", *options)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
-    plain, changed = result(), result("--set", "constants.arbitration_hold_us=2.63")
     assert changed["changes"] == {"constants.arbitration_hold_us": 2.63}
     before, after = (
         next(one for one in document["results"] if one["timing_model"] == "paper") for document in (plain, changed)
@@ -45,7 +31,6 @@ def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
     assert done.stdout.startswith("With --set constants.ARBITRATION_HOLD_US=2.63.")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -58,12 +43,12 @@ def test_the_paper_s_hold_time_is_changed_everywhere() -> None:
         ("constants.EQ15_CONSTANT_US=3", "cannot be changed: equation (15) is tested as it is printed"),
     ],
 )
-def test_what_is_no_constant_is_refused(text: str, words: str) -> None:
+def test_what_is_no_constant_is_refused(text: str, words: str, run: Run) -> None:
     done = run("capacity", "paper-4ms", "--set", text)
     assert (done.returncode, words in done.stderr) == (2, True), done.stderr
 
 
-def test_compare_takes_a_constant_of_any_kind() -> None:
+def test_compare_takes_a_constant_of_any_kind(run: Run) -> None:
     options = ("compare", "ethercat-servo-8", "--buses", "ieee1394", "--format", "json")
     plain, changed = (
         json.loads(run(*options, *more).stdout)["buses"][0]["required_us"]
@@ -72,7 +57,7 @@ def test_compare_takes_a_constant_of_any_kind() -> None:
     assert changed > plain
 
 
-def test_a_table_s_constant_is_named_by_its_key_and_csv_names_it() -> None:
+def test_a_table_s_constant_is_named_by_its_key_and_csv_names_it(run: Run) -> None:
     typed = "constants.DATA_RATE_MBIT_S[s400]=200"
     done = run("capacity", "paper-4ms", "--format", "csv", "--set", typed)
     head, first, *_ = done.stdout.splitlines()
@@ -82,5 +67,8 @@ def test_a_table_s_constant_is_named_by_its_key_and_csv_names_it() -> None:
 
 
 def test_the_environment_changes_no_figure() -> None:
-    document = busplan.capacity("paper-4ms").to_dict()
-    assert result() == document
+    """A variable changed figures once, of a process that began with it."""
+    variables = {"PYTHONPATH": str(SOURCE), "BUSPLAN_CONSTANTS": "ARBITRATION_HOLD_US=99;GAPS_TICKS=abc"}
+    command = [sys.executable, "-m", "busplan", "capacity", "paper-4ms", "--format", "json"]
+    done = subprocess.run(command, capture_output=True, check=True, env=variables)
+    assert json.loads(done.stdout) == busplan.capacity("paper-4ms").to_dict()

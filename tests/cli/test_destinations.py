@@ -89,7 +89,7 @@ def test_what_is_the_purpose_is_done(run: Callable[..., object], folder: Path) -
         update,
         ("plan", "p.toml", "--nodes", "3", "--apply"),
         ("plan", "p.toml", "-o", "new.toml"),
-        ("circle-test", "paper-4ms", "-o", "a.svg", "--trace", "b.csv"),
+        ("circle-test", "paper-4ms", "-o", "a.svg", "--trace", "b.csv", "--every", "1000"),
     ):
         assert getattr(run(*arguments, cwd=folder), "returncode", None) == 0
     after = contents(folder)

@@ -158,7 +158,7 @@ def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, sh
     names = ('sub/it\'s $(a)  `b` "c"\there \u202e.toml', "-o.toml")
     for name in names:
         (tmp_path / name).write_text(QUICK + CIRCLE, encoding="utf-8")
-    page = reported(run, shell, "--period", "0.4ms", "--", *names, names[0], cwd=tmp_path)
+    page = reported(run, shell, "--period", "0.4ms", "--", *names, cwd=tmp_path)
     assert "busplan capacity ./-o.toml --sensitivity --period 400us" in page.lines
 
 
@@ -207,18 +207,16 @@ def test_the_same_profile_gives_the_same_bytes_to_a_file_and_to_standard_output(
         assert (tmp_path / file).read_text(encoding="utf-8") == shown
 
 
-def test_standard_input_and_a_title(run: Run, tmp_path: Path) -> None:
-    done = run("report", "-", "--title", "Cell 7 <north>", stdin=QUICK, cwd=tmp_path)
-    assert "<title>Cell 7 &lt;north&gt; - busplan</title>" in done.stdout
-    assert "<h1>Cell 7 &lt;north&gt;</h1>" in done.stdout
-    assert Page(done.stdout).lines[0] == "busplan capacity - --sensitivity"
-
-
-def test_a_comparison_stands_in_front_and_leads_to_each_profile(run: Run) -> None:
-    done = run("report", "paper-1ms", "paper-optimal-gap")
+def test_a_comparison_stands_in_front_and_leads_to_each_profile_also_of_standard_input(
+    run: Run, tmp_path: Path
+) -> None:
+    done = run("report", "-", "paper-optimal-gap", "--title", "Cell 7 <north>", stdin=QUICK, cwd=tmp_path)
     assert done.returncode == 0
     assert done.stdout.index('id="comparison"') < done.stdout.index('id="p1"') < done.stdout.index('id="p2"')
     assert [done.stdout.count(f'href="#p{number}"') for number in (1, 2, 3)] == [1, 1, 0]
+    assert "<title>Cell 7 &lt;north&gt; - busplan</title>" in done.stdout
+    assert "<h1>Cell 7 &lt;north&gt;</h1>" in done.stdout
+    assert Page(done.stdout).lines[0] == "busplan capacity - --sensitivity"
 
 
 @pytest.mark.parametrize(

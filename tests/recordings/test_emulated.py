@@ -4,7 +4,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from functools import cache
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -15,15 +14,9 @@ from tests.oracles import can_recording
 from tests.oracles.emulated import FAULTS, HIDDEN, Fault, Subject
 from tests.registers import at_least
 
-ALL_SEEDS = {"can": (9, 16, 22, 26, 34, 42), "ethercat": (1, 3, 8, 14, 21, 31)}
+ALL_SEEDS = {"can": (42, 9, 22, 16, 26, 34), "ethercat": (1, 3, 8, 14, 21, 31)}
 SEEDS = {kind: seeds[: at_least(3)] for kind, seeds in ALL_SEEDS.items()}
 Subjects = Callable[[str, int], Subject]
-
-
-@pytest.fixture(scope="module")
-def subjects(tmp_path_factory: pytest.TempPathFactory) -> Subjects:
-    """Machines by kind and seed, each made once."""
-    return cache(lambda kind, seed: Subject(kind, seed, tmp_path_factory.mktemp(f"{kind}-{seed}")))
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 import struct
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -16,6 +15,7 @@ from tests.oracles import can_recording as log
 from tests.oracles import ethercat_recording as capture
 from tests.oracles import moments
 from tests.oracles.emulated import FAULTS, NoPlaceError, Subject
+from tests.registers import at_least
 
 LOCATED = {
     "commands late": "last PDO after SYNC",
@@ -36,14 +36,9 @@ LOCATED = {
 """Figure of each fault that has a moment."""
 FROM_EARLIEST = ("SYNC: jitter of the arrival", "latest start")
 """Figures that count from the earliest event."""
-SEEDS = {"can": (9, 16, 22, 26, 34, 42), "ethercat": (1, 3)}
+SEEDS = {"can": (42, 9, 26, 34, 16, 22)[: at_least(2)], "ethercat": (1, 3)}
 ONE_IS_WORST = 0.02
 """Periods by which one of the late events is later than the others."""
-
-
-@pytest.fixture(scope="module")
-def subjects(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Subject]:
-    return cache(lambda kind, seed: Subject(kind, seed, tmp_path_factory.mktemp(f"{kind}-{seed}")))
 
 
 def recorded(subject: Subject, machine: Any) -> tuple[busplan.MeasuredAnswer, list[float], moments.Events]:
