@@ -11,7 +11,7 @@ from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, bit_us
 from busplan.buses.can.logged import wire_times
 from busplan.buses.can.pdos import PdoCycle
-from busplan.buses.can.recorded_cycles import Senders
+from busplan.buses.can.recorded_cycles import Senders, finite
 from busplan.buses.can.streams import place
 from busplan.buses.can.traffic import NAMES
 from busplan.buses.network import Group
@@ -261,7 +261,7 @@ class RequestLog:
         figure = RecordedFigure(
             "last answer after the first request",
             "us",
-            planned_us if np.isfinite(planned_us) else None,
+            finite(planned_us),
             worst.value,
             None if doubt_us is None else doubt_us + self.error_us,
             "at most",
