@@ -11,7 +11,7 @@ from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, bit_us
 from busplan.buses.can.logged import wire_times
 from busplan.buses.can.pdos import PdoCycle
-from busplan.buses.can.recorded_cycles import Senders, finite
+from busplan.buses.can.recorded_cycles import SenderNames, finite
 from busplan.buses.can.streams import place
 from busplan.buses.can.traffic import NAMES
 from busplan.buses.network import Group
@@ -80,7 +80,7 @@ class RequestLog:
         stretch: can_timing.ClockStretch,
         by_identifier: Mapping[tuple[int, bool], can_timing.SentFrames],
         *,
-        senders: Senders,
+        senders: SenderNames,
         share: float,
         stamp_error_us: float,
     ) -> None:

@@ -16,7 +16,7 @@ from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.recorded_cycles import (
     EMERGENCY,
     Ints,
-    Senders,
+    SenderNames,
     SentPdos,
     emergencies,
     finite,
@@ -74,7 +74,7 @@ class _Log:
         self.by_identifier = can_timing.frames_by_identifier(frames, self.stretch)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
-        self.senders = Senders(network, streams(self.traffic))
+        self.senders = SenderNames(network, streams(self.traffic))
         self.pdos: list[SentPdos] = []
         """PDOs beside their SYNCs, by identifier; none before they were compared."""
         self.messages = {message.name: message for message in network.profile.message}

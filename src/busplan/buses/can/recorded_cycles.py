@@ -30,7 +30,7 @@ _EMERGENCY_BYTES: Final = 8
 """Data of an emergency: error code, error register and five bytes of the maker [bytes]."""
 
 
-class Senders:
+class SenderNames:
     """Streams of a plan, and the names of those who send their identifiers."""
 
     def __init__(self, network: Network, sent: Sequence[Stream]) -> None:
@@ -108,7 +108,7 @@ def pdos_beside_sync(
     sync: SentFrames,
     periods: PeriodicEvents,
     planned_us: float,
-    senders: "Senders",
+    senders: "SenderNames",
     by_identifier: Mapping[tuple[int, bool], SentFrames],
 ) -> Iterator[SentPdos]:
     """PDOs of each identifier beside SYNC, of which the recorded periods and the planned one are given [us]."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil
 from typing import Any, Final
 
-from busplan.buses.can.recorded_cycles import Senders, finite
+from busplan.buses.can.recorded_cycles import SenderNames, finite
 from busplan.buses.can.streams import Stream
 from busplan.buses.rule import CLOCK_TOLERANCE, RecordedFigure, latest_start
 from busplan.recordings.can import CanFrames
@@ -17,7 +17,7 @@ _TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 class MessageLog:
     """Messages and SYNC of a log beside the plan."""
 
-    def __init__(self, frames: CanFrames, *, senders: Senders, share: float, stamp_error_us: float) -> None:
+    def __init__(self, frames: CanFrames, *, senders: SenderNames, share: float, stamp_error_us: float) -> None:
         self.frames, self.senders, self.share, self.stamp_error_us = frames, senders, share, stamp_error_us
         self.edits: dict[str, Any] = {}
 
