@@ -14,16 +14,15 @@ from busplan.buses.cycle import BusCycle
 from busplan.buses.emulation import Emulator
 from busplan.buses.figure import BusFigures
 from busplan.buses.hosts import KnownHost, hosts
-from busplan.buses.limits import (
-    ANY_PERIOD,
+from busplan.buses.limits import ANY_PERIOD, Limit, Periods
+from busplan.buses.network import Network
+from busplan.buses.parts import (
     IDLE,
     EventKind,
     Key,
     KeyRole,
-    Limit,
     MeasuredLatencies,
     PayloadRange,
-    Periods,
     Perturbation,
     Safety,
     Setting,
@@ -31,7 +30,6 @@ from busplan.buses.limits import (
     TimingModel,
     Value,
 )
-from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, Rule
 from busplan.buses.waterfall import RecordedCycles
 from busplan.errors import BusplanError

@@ -11,8 +11,8 @@ from busplan.sections.base import beside
 from busplan.sourced import Sourced, read_toml
 
 if TYPE_CHECKING:
-    from busplan.buses.limits import Value
     from busplan.buses.network import Network
+    from busplan.buses.parts import Value
     from busplan.recordings.statistics import Events
     from busplan.sections.profile import Profile
 
