@@ -140,6 +140,12 @@ CLOCK_TOLERANCE: Final = Sourced(
     meaning="largest error of the clocks that a period is made and recorded by, as a share of it",
 )
 
+
+def clocks_us(period_us: float) -> float:
+    """Standard uncertainty of a period by the clocks of the bus and of the recorder [us]."""
+    return float(CLOCK_TOLERANCE * period_us / 3**0.5)
+
+
 _FIRST_DAY_NS: Final = 10 * 365 * 86400 * 1_000_000_000
 _LAST_DAY_NS: Final = 1 << 63
 _ROUNDING: Final = 1e-9

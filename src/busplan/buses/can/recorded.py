@@ -247,7 +247,7 @@ class _Log:
             "us",
             finite(own_us + waits_us + max(pdos.stream.frame_us for pdos in commands)),
             gap.value,
-            self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
+            expanded(*doubts_us, gap.uncertainty or 0.0, stamps_us=self.stamp_error_us),
             "at most" if is_planned else "shown",
             len(gaps_us),
             "bus.host_us",
@@ -257,7 +257,7 @@ class _Log:
             # Only their sum counts, so what the adapter's keys do not give is the host's. So is what other frames add.
             shortest = streams(replace(self.traffic, is_stuffed=False))
             least_us = min(stream.frame_us for stream in shortest if stream.name == NAMES["write"])
-            doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
+            doubt_us = expanded(gap.uncertainty or 0.0, stamps_us=self.stamp_error_us) or 0.0
             self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
             self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
         yield self._located(found, first[is_whole], gaps_us)
@@ -285,7 +285,7 @@ class _Log:
             "us",
             finite(planned_us),
             latest.value,
-            self._with_stamps(*doubts, latest.uncertainty or 0.0),
+            expanded(*doubts, latest.uncertainty or 0.0, stamps_us=self.stamp_error_us),
             "at most",
             len(last_us),
             key,
@@ -339,11 +339,6 @@ class _Log:
         )
         yield from log.figures(self._missed)
         self.edits |= log.edits
-
-    def _with_stamps(self, *uncertainties: float) -> float | None:
-        """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""
-        doubt_us = expanded(*uncertainties)
-        return None if doubt_us is None else doubt_us + self.stamp_error_us
 
     def _stream(self, stream: Stream, label: str, shortest_us: float, worst_us: float) -> Iterator[RecordedFigure]:
         """Period, jitter, data and format of a message or of SYNC, and response of a message; else data and format."""

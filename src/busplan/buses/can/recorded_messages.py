@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from busplan.buses.can.recorded_cycles import SenderNames, finite
 from busplan.buses.can.streams import Stream
-from busplan.buses.rule import CLOCK_TOLERANCE, RecordedFigure, latest_start
+from busplan.buses.rule import CLOCK_TOLERANCE, RecordedFigure, clocks_us, latest_start
 from busplan.recordings.can import CanFrames
 from busplan.recordings.can_timing import SentFrames, event_model, mean_period
 from busplan.recordings.statistics import LEAST_EVENTS, ahead, expanded, lateness, periodic_events, policed, quantile
@@ -29,11 +29,11 @@ class MessageLog:
             yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
             return
         mean = mean_period(sent.times_us, periods)
-        doubt_us = expanded(mean.uncertainty, _clocks_us(planned_us), self.stamp_error_us / count)
+        doubt_us = expanded(mean.uncertainty, clocks_us(planned_us), self.stamp_error_us / count)
         yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
         if spread_us is not None:
             late = lateness(periods, self.share)
-            doubt_us = (expanded(late.uncertainty) or 0.0) + self.stamp_error_us
+            doubt_us = expanded(late.uncertainty, stamps_us=self.stamp_error_us)
             quantity = "SYNC: jitter of the arrival"
             key = "bus.sync_jitter_us"
             jitter = RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count, key)
@@ -68,7 +68,7 @@ class MessageLog:
             # A plan with bursts or jitter allows a row of frames that is so much faster.
             allowed_us = (stream.burst - 1) * planned_us + stream.jitter_us
             scatter_us = max(mean.uncertainty, allowed_us / (count - 1) / 2)
-        doubt_us = expanded(scatter_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
+        doubt_us = expanded(scatter_us, clocks_us(planned_us), self.stamp_error_us / (count - 1))
         period = RecordedFigure(
             f"{label}: period",
             "us",
@@ -92,7 +92,7 @@ class MessageLog:
             "us",
             spread_us,
             sooner.value,
-            None if spread_us is None else (expanded(sooner.uncertainty or 0.0) or 0.0) + self.stamp_error_us,
+            None if spread_us is None else expanded(sooner.uncertainty or 0.0, stamps_us=self.stamp_error_us),
             "shown" if spread_us is None else "at most",
             len(sent.times_us),
             f"{key}.jitter_us",
@@ -131,8 +131,3 @@ def spread_us(stream: Stream, shortest_us: float, worst_us: float) -> float | No
     All of a burst may come with its first.
     """
     return finite(max(worst_us - shortest_us, 0.0) + (stream.burst - 1) * stream.period_us)
-
-
-def _clocks_us(period_us: float) -> float:
-    """Standard uncertainty of a period by the clocks of the bus and of the recorder [us]."""
-    return float(CLOCK_TOLERANCE * period_us / 3**0.5)
