@@ -24,17 +24,9 @@ from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, Premise
 from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
-from busplan.buses.limits import (
-    Cost,
-    EventKind,
-    ExactLimit,
-    PayloadRange,
-    Perturbation,
-    Setting,
-    Starter,
-    TimingModel,
-)
+from busplan.buses.limits import ExactLimit
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, EventKind, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, rounded_up
 from busplan.sections.base import Section

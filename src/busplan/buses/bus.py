@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from busplan.buses.cycle import BusCycle
 from busplan.buses.emulation import Emulator
 from busplan.buses.figure import BusFigures
-from busplan.buses.hosts import Host, hosts
-from busplan.buses.limits import (
-    ANY_PERIOD,
+from busplan.buses.hosts import KnownHost, hosts
+from busplan.buses.limits import ANY_PERIOD, Limit, Periods
+from busplan.buses.network import Network
+from busplan.buses.parts import (
     IDLE,
     EventKind,
     Key,
     KeyRole,
-    Limit,
     MeasuredLatencies,
     PayloadRange,
-    Periods,
     Perturbation,
     Safety,
     Setting,
@@ -31,7 +30,6 @@ from busplan.buses.limits import (
     TimingModel,
     Value,
 )
-from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, Rule
 from busplan.buses.waterfall import RecordedCycles
 from busplan.errors import BusplanError
@@ -119,7 +117,7 @@ class Bus(ABC):
         """Dotted key with a role; empty where the kind has none."""
         return next((name for name, key in self.keys.items() if key.role == role), "")
 
-    def hosts(self, variant: str = "") -> dict[str, Host]:
+    def hosts(self, variant: str = "") -> dict[str, KnownHost]:
         """Hosts that a new profile may have, by name: those of which its keys can say all that is known."""
         timed = {name: host for name, host in hosts().items() if self.kind in host.own_us}
         has_jitter = self.key_of("wake-up") and variant not in self.starter.without_wake_up

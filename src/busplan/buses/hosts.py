@@ -12,7 +12,7 @@ _COMMENTS_AT = 27
 """Column of comments in a new profile."""
 
 
-class Host(NamedTuple):
+class KnownHost(NamedTuple):
     """A host, with times that were measured on other machines."""
 
     meaning: str
@@ -44,6 +44,6 @@ def _line(key: str, value: object, comment: str) -> str:
 
 
 @cache
-def hosts() -> Mapping[str, Host]:
+def hosts() -> Mapping[str, KnownHost]:
     """All hosts by name."""
-    return {name: Host(**words) for name, words in read_toml("busplan.buses", "hosts.toml").items()}
+    return {name: KnownHost(**words) for name, words in read_toml("busplan.buses", "hosts.toml").items()}

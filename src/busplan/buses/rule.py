@@ -11,8 +11,8 @@ from busplan.sections.base import beside
 from busplan.sourced import Sourced, read_toml
 
 if TYPE_CHECKING:
-    from busplan.buses.limits import Value
     from busplan.buses.network import Network
+    from busplan.buses.parts import Value
     from busplan.recordings.statistics import Events
     from busplan.sections.profile import Profile
 
@@ -139,6 +139,12 @@ CLOCK_TOLERANCE: Final = Sourced(
     source="IEEE 802.3, clock of a 100 Mbit/s port, 100 ppm; taken for the clock of a recorder, too",
     meaning="largest error of the clocks that a period is made and recorded by, as a share of it",
 )
+
+
+def clocks_us(period_us: float) -> float:
+    """Standard uncertainty of a period by the clocks of the bus and of the recorder [us]."""
+    return float(CLOCK_TOLERANCE * period_us / 3**0.5)
+
 
 _FIRST_DAY_NS: Final = 10 * 365 * 86400 * 1_000_000_000
 _LAST_DAY_NS: Final = 1 << 63

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Any, Final, NamedTuple
 
-from busplan.buses.limits import Value
+from busplan.buses.parts import Value
 from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity
 from busplan.elementwise import within
 from busplan.english import listed, printable, told_apart

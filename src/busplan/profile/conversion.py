@@ -14,7 +14,7 @@ from pydantic import BaseModel
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
-from busplan.buses.limits import KeyRole
+from busplan.buses.parts import KeyRole
 from busplan.profile.document import TomlTable, comment_grade, profile_of
 from busplan.profile.kinds import dotted_keys, flat, holder, models_of, named_tables
 from busplan.sections.base import TRANSACTION_KINDS, beside

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
-from busplan.buses.limits import Starter
+from busplan.buses.parts import Starter
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError, PlacedError
 from busplan.profile.document import decode, read_bytes, validate

@@ -8,8 +8,8 @@ from itertools import chain
 from math import ceil, prod
 from typing import Final
 
-from busplan.buses.limits import Value
 from busplan.buses.network import Network
+from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.forms import blocks
 from busplan.progress import Progress, ignored, part_of

@@ -20,6 +20,7 @@ from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.files import require_regular
 from busplan.progress import Progress
+from busplan.recordings.can_bits import CLASSICAL_BYTES, written_bits
 from busplan.recordings.capture import SOCKETCAN, CaptureNotes, is_capture, packets
 from busplan.recordings.statistics import Events, Floats
 from busplan.recordings.written import SYNTHETIC
@@ -62,14 +63,6 @@ _SWITCHED_FLAG, _FD_FLAG = 1, 4
 _FD_PACKET_BYTES: Final = 72
 _REPORT_EVERY: Final = 5000
 """Frames between two reports of progress."""
-_CRC_15: Final = 0x4599
-_CRC_BITS: Final = 15
-_NEVER_STUFFED: Final = 13
-"""Bits after the CRC: its delimiter, acknowledge, end of frame and interframe space [bits]."""
-_RUN: Final = 5
-"""Equal bits after which the opposite one is stuffed."""
-_PIECE: Final = 50_000  # Frames whose stuff bits are counted at once.
-_CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
 """Bytes of the DLC values 10 to 15, as python-can gives `dlc`, even for classical frames, which have 8 bytes."""
 _MOST_LINE_BYTES: Final = 4096
@@ -400,7 +393,7 @@ class _Log:
                 last_s,
                 number,
                 message.arbitration_id,
-                int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"),
+                int.from_bytes(message.data[:CLASSICAL_BYTES].ljust(CLASSICAL_BYTES, b"\0"), "big"),
                 message.dlc,
                 message.is_extended_id * _EXTENDED | is_remote * _REMOTE | is_fd * _FD | is_switched * _SWITCHED,
             )
@@ -434,7 +427,7 @@ class _Log:
             rows["number"].copy(),
             identifiers,
             extended,
-            np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
+            np.where(fd, sizes, np.minimum(sizes, CLASSICAL_BYTES)),
             rows["data"].copy(),
             np.where(fd, 0, written_bits(identifiers, extended, remote, codes, rows["data"])),
             fd,
@@ -467,82 +460,3 @@ def _require_frame(message: Any, before_s: float | None) -> None:
         raise _DamageError(f"an identifier of {identifier:#x}, which has no room in {bits} bits")
     if not 0 <= message.dlc <= _LONG_BYTES[-1] or len(message.data) > _LONG_BYTES[-1]:
         raise _DamageError(f"data of {max(message.dlc, len(message.data))} bytes")
-
-
-def written_bits(
-    identifiers: npt.NDArray[np.int64],
-    extended: npt.NDArray[np.bool_],
-    remote: npt.NDArray[np.bool_],
-    sizes: npt.NDArray[np.int64],
-    data: npt.NDArray[np.uint64],
-) -> npt.NDArray[np.int64]:
-    """Bits of n frames on the wire, each with its own stuff bits, interframe space included [bits].
-
-    `extended` frames have 29-bit identifiers. `sizes` are DLC values 0..15; above 8 they mean 8 bytes. `data` has up to
-    8 bytes of each frame, the first one in the highest bits.
-
-    References
-    ----------
-    ISO 11898-1; CAN 2.0, 3.1.1 and the generator polynomial 0x4599.
-
-    Examples
-    --------
-    >>> frame = np.array([0x14]), np.array([False]), np.array([False]), np.array([1]), np.array([1 << 56], np.uint64)
-    >>> int(written_bits(*frame)[0])
-    58
-    """
-    bits = np.zeros(len(identifiers), dtype=np.int64)
-    sort = sizes * 4 + extended * 2 + remote
-    for kind in np.unique(sort):
-        places = np.flatnonzero(sort == kind)
-        for first in range(0, len(places), _PIECE):
-            piece = places[first : first + _PIECE]
-            is_extended, is_remote, size = bool(kind & 2), bool(kind & 1), int(kind) // 4
-            bits[piece] = _stuffed(
-                _columns(identifiers[piece], data[piece], is_extended=is_extended, is_remote=is_remote, size=size)
-            )
-    return bits
-
-
-def _columns(
-    identifiers: npt.NDArray[np.int64],
-    data: npt.NDArray[np.uint64],
-    *,
-    is_extended: bool,
-    is_remote: bool,
-    size: int,
-) -> list[npt.NDArray[np.uint8]]:
-    """Bits of frames of one kind from the start of frame to the data, as one array over all frames for each bit."""
-
-    def constant(*bits: int) -> list[npt.NDArray[np.uint8]]:
-        return [np.full(len(identifiers), bit, dtype=np.uint8) for bit in bits]
-
-    def field(numbers: npt.NDArray[Any], width: int, *, above: int = 0) -> list[npt.NDArray[np.uint8]]:
-        shifts = range(above + width - 1, above - 1, -1)
-        return [(numbers >> numbers.dtype.type(shift) & numbers.dtype.type(1)).astype(np.uint8) for shift in shifts]
-
-    data_bits = 0 if is_remote else 8 * min(size, _CLASSICAL_BYTES)
-    return [
-        *constant(0),  # start of frame
-        *field(identifiers, 11, above=18 if is_extended else 0),
-        *(constant(1, 1) + field(identifiers, 18) if is_extended else ()),  # SRR, IDE
-        *constant(is_remote, 0, 0, *(size >> bit & 1 for bit in (3, 2, 1, 0))),  # RTR, r1 or IDE, r0, DLC
-        *field(data, data_bits, above=64 - data_bits),
-    ]
-
-
-def _stuffed(columns: list[npt.NDArray[np.uint8]]) -> npt.NDArray[np.int64]:
-    """Lengths of frames with CRC, stuff bits and all bits after them [bits]."""
-    register = np.zeros(len(columns[0]), dtype=np.int32)
-    for bit in columns:
-        register = (register << 1 & 0x7FFF) ^ (register >> 14 ^ bit) * _CRC_15
-    crc = [(register >> bit & 1).astype(np.uint8) for bit in range(_CRC_BITS - 1, -1, -1)]
-    last, run = np.full(len(register), 2, dtype=np.uint8), np.zeros(len(register), dtype=np.uint8)
-    stuffed = np.zeros(len(register), dtype=np.int64)
-    for bit in (*columns, *crc):
-        run = np.where(bit == last, run + np.uint8(1), np.uint8(1))
-        is_full = run == _RUN
-        stuffed += is_full
-        last = np.where(is_full, 1 - bit, bit).astype(np.uint8)
-        run = np.where(is_full, np.uint8(1), run)
-    return stuffed + len(columns) + _CRC_BITS + _NEVER_STUFFED

@@ -373,7 +373,7 @@ def step(times_ns: npt.NDArray[np.int64]) -> float:
     return int(np.gcd.reduce(np.abs(np.diff(times_ns)))) / 1000
 
 
-def expanded(*uncertainties: float | None) -> float | None:
-    """Expanded uncertainty, twice the root sum of squares; None if a part is None."""
+def expanded(*uncertainties: float | None, stamps_us: float = 0.0) -> float | None:
+    """Expanded uncertainty, twice the root sum of squares, and the error of stamps; None if a part is None."""
     total = sqrt(sum(inf if part is None else part**2 for part in uncertainties))
-    return None if total == inf else _COVERAGE * total
+    return None if total == inf else _COVERAGE * total + stamps_us

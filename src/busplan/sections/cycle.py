@@ -59,11 +59,13 @@ DERIVED_UNCERTAINTY_US: Final = Sourced(
 )
 
 
-def time_uncertainty_us(us: Number, *, is_guess: bool) -> Number:
-    """Standard uncertainty of a machine's time that nobody has measured [us].
+def time_uncertainty_us(us: Number, *, is_guess: bool, given_us: Number | None = None) -> Number:
+    """Standard uncertainty of a machine's time: as given, else that of a time that nobody has measured [us].
 
-    A guess is between 0 and twice its value; a given time is known to 10 %.
+    A guess is between 0 and twice its value; another time is known to 10 %.
     """
+    if given_us is not None:
+        return given_us
     return choose(is_guess, GUESS_SHARE, UNKNOWN_SHARE) * us
 
 

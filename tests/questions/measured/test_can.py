@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.recordings.can import written_bits
+from busplan.recordings.can_bits import written_bits
 from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump, servo_8
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.sync import SyncCycle
 from busplan.buses.can.traffic import Traffic, traffic_of
 from busplan.buses.figure import NONPERIODIC
-from busplan.buses.limits import EventKind
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 
 __all__ = [
     "EVENTS",

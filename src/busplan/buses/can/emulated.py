@@ -13,7 +13,7 @@ from busplan.buses.can.traffic import HOST, NODE, NOT_BY_PRIORITY, SYNC, traffic
 from busplan.buses.emulation import LEAST_SHARE, Emulation, Emulator, Fault
 from busplan.buses.network import Group, Network
 from busplan.errors import ArgumentError
-from busplan.recordings.can import written_bits
+from busplan.recordings.can_bits import written_bits
 from busplan.recordings.written import candump
 
 _ERROR: Final = "20000088#0000000000000000"

@@ -11,11 +11,11 @@ from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS, bit_us
 from busplan.buses.can.logged import wire_times
 from busplan.buses.can.pdos import PdoCycle
-from busplan.buses.can.recorded_cycles import Senders
+from busplan.buses.can.recorded_cycles import SenderNames, finite
 from busplan.buses.can.streams import place
 from busplan.buses.can.traffic import NAMES
 from busplan.buses.network import Group
-from busplan.buses.rule import CLOCK_TOLERANCE, RecordedFigure
+from busplan.buses.rule import RecordedFigure, clocks_us
 from busplan.english import first_of
 from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames
@@ -80,7 +80,7 @@ class RequestLog:
         stretch: can_timing.ClockStretch,
         by_identifier: Mapping[tuple[int, bool], can_timing.SentFrames],
         *,
-        senders: Senders,
+        senders: SenderNames,
         share: float,
         stamp_error_us: float,
     ) -> None:
@@ -220,8 +220,7 @@ class RequestLog:
             yield period._replace(hidden=f"fewer than {LEAST_EVENTS} cycles")
             return
         mean = can_timing.mean_period(starts_us, periods)
-        clocks_us = float(CLOCK_TOLERANCE * planned_us / 3**0.5)
-        doubt_us = expanded(mean.uncertainty, clocks_us, self.error_us / count)
+        doubt_us = expanded(mean.uncertainty, clocks_us(planned_us), self.error_us / count)
         yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
         skipped = np.flatnonzero(np.diff(periods.places) > 1) + 1
         figure = missed("cycles without requests", periods.missing, int(periods.places[-1]) + 1)
@@ -257,13 +256,12 @@ class RequestLog:
         # The time before the first request and behind the last answer is not on the wire.
         bus = self.network.profile.bus
         planned_us = self.cycle.required_us - self.network.nonperiodic_us - bus.host_us - self._adapter_us
-        doubt_us = expanded(*waits_us, worst.uncertainty or 0.0)
         figure = RecordedFigure(
             "last answer after the first request",
             "us",
-            planned_us if np.isfinite(planned_us) else None,
+            finite(planned_us),
             worst.value,
-            None if doubt_us is None else doubt_us + self.error_us,
+            expanded(*waits_us, worst.uncertainty or 0.0, stamps_us=self.error_us),
             "at most",
             int(is_whole.sum()),
             "cycle.period_us",
@@ -298,7 +296,7 @@ class RequestLog:
             if not len(found.least_us):
                 continue
             worst = quantile(found.least_us, self.share)
-            doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
+            doubt_us = expanded(worst.uncertainty or 0.0, stamps_us=self.error_us)
             key, count = node.group.key("execution.worst_extra_us"), len(found.least_us)
             quantity, note = f"{node.name}: request to answer", _median(found.least_us, found.is_exact)
             figure = RecordedFigure(quantity, "us", node.planned_us, worst.value, doubt_us, "at most", count, key, note)
@@ -353,7 +351,7 @@ class RequestLog:
         ready_us, is_exact = self._ready_us(first, floors)
         gaps_us = np.maximum(ready_us - self.times_us[floors], 0.0)
         worst = quantile(gaps_us, self.share)
-        doubt_us = (expanded(worst.uncertainty or 0.0) or 0.0) + self.error_us
+        doubt_us = expanded(worst.uncertainty or 0.0, stamps_us=self.error_us) or 0.0
         behind = "request" if self.traffic.access == "burst" else "answer"
         # Requests at once wait for no answer to come through the adapter.
         adapter_us = 0.0 if self.traffic.access == "burst" else self._adapter_us

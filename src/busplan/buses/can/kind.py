@@ -16,8 +16,8 @@ from busplan.buses.can.equations import (
 from busplan.buses.can.rules import LIMITS, RULES
 from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of
-from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Recorded
 from busplan.buses.waterfall import RecordedCycles
 from busplan.progress import Progress

@@ -1,8 +1,8 @@
-"""A CAN log beside the plan: the bit rate, the load, every cycle, and the period, bursts and data of every message."""
+"""A CAN log beside the plan: the bit rate, the load, every cycle, and the data and format of every frame."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from math import ceil, inf, isfinite
+from math import ceil, inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,40 +16,32 @@ from busplan.buses.can.pdos import PdoCycle
 from busplan.buses.can.recorded_cycles import (
     EMERGENCY,
     Ints,
-    Senders,
+    SenderNames,
     SentPdos,
     emergencies,
+    finite,
     joined,
     last_pdos_us,
     pdos_beside_sync,
 )
+from busplan.buses.can.recorded_messages import MessageLog, spread_us
 from busplan.buses.can.requests import RequestCycle
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of, latest_start
+from busplan.buses.rule import SURE, Recorded, RecordedFigure, day_of
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings import can_timing
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.statistics import (
-    LEAST_EVENTS,
-    Floats,
-    ahead,
-    expanded,
-    lateness,
-    periodic_events,
-    policed,
-    quantile,
-)
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded, periodic_events, quantile
 
 _NOT_SHOWN: Final = "A log does not show the bit rate, frames that the recorder missed, when a frame was queued"
+_PERIOD: Final = "cycle.period_us"
 _BESIDE_SYNC: Final = ", commands that are always late by whole periods, or the nodes' own time"
 _ROUNDING_US: Final = 1.0
 _CLASSICAL: Final = "classical CAN"
-_PERIOD: Final = "cycle.period_us"
-_TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 
 
 def recorded(network: Network, path: Path, *, share: float, channel: str | None, progress: Progress) -> Recorded:
@@ -82,7 +74,7 @@ class _Log:
         self.by_identifier = can_timing.frames_by_identifier(frames, self.stretch)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
-        self.senders = Senders(network, streams(self.traffic))
+        self.senders = SenderNames(network, streams(self.traffic))
         self.pdos: list[SentPdos] = []
         """PDOs beside their SYNCs, by identifier; none before they were compared."""
         self.messages = {message.name: message for message in network.profile.message}
@@ -95,6 +87,7 @@ class _Log:
         wire_us = wire_times(frames, self.taken, **rates).least_us
         self.stamp_error_us = self.step_us + can_timing.late_stamps_us(self.stretch, wire_us)
         """Largest error of a stamp: the step of stamps, and what frames come closer than the bus allows [us]."""
+        self.message_log = MessageLog(frames, senders=self.senders, share=share, stamp_error_us=self.stamp_error_us)
 
     @property
     def has_switch(self) -> bool:
@@ -123,9 +116,9 @@ class _Log:
         responses = {(answer.group, answer.name): answer.phases for answer in self.cycle.latencies()}
         unstuffed = streams(replace(self.traffic, is_stuffed=False))
         for stream, shortest, label in zip(self.senders.sent, unstuffed, self.senders.labels, strict=True):
-            phases = responses.get((stream.group, stream.name))
-            yield from self._stream(stream, label, self._spread_us(stream, shortest.frame_us, phases))
-            yield from self._response(stream, label, shortest.frame_us, phases or {})
+            worst_us = responses.get((stream.group, stream.name), {}).get("worst_response_us", inf)
+            yield from self._stream(stream, label, shortest.frame_us, worst_us)
+            yield from self._response(stream, label, worst_us)
         count = len(self.taken)
         if unseen := len(self.unseen):
             hidden = f"never in the log: {first_of(self.unseen, can_timing.LISTED)}"
@@ -252,9 +245,9 @@ class _Log:
         found = RecordedFigure(
             "first command after the last feedback",
             "us",
-            _finite(own_us + waits_us + max(pdos.stream.frame_us for pdos in commands)),
+            finite(own_us + waits_us + max(pdos.stream.frame_us for pdos in commands)),
             gap.value,
-            self._with_stamps(*doubts_us, gap.uncertainty or 0.0),
+            expanded(*doubts_us, gap.uncertainty or 0.0, stamps_us=self.stamp_error_us),
             "at most" if is_planned else "shown",
             len(gaps_us),
             "bus.host_us",
@@ -264,7 +257,7 @@ class _Log:
             # Only their sum counts, so what the adapter's keys do not give is the host's. So is what other frames add.
             shortest = streams(replace(self.traffic, is_stuffed=False))
             least_us = min(stream.frame_us for stream in shortest if stream.name == NAMES["write"])
-            doubt_us = self._with_stamps(gap.uncertainty or 0.0) or 0.0
+            doubt_us = expanded(gap.uncertainty or 0.0, stamps_us=self.stamp_error_us) or 0.0
             self.edits["bus.host_us"] = ceil(10 * (gap.value - adapter_us - least_us)) / 10
             self.edits |= {"bus.host_grade": "measured", "bus.host_uncertainty_us": round(doubt_us / 2, 4)}
         yield self._located(found, first[is_whole], gaps_us)
@@ -290,9 +283,9 @@ class _Log:
         figure = RecordedFigure(
             quantity,
             "us",
-            _finite(planned_us),
+            finite(planned_us),
             latest.value,
-            self._with_stamps(*doubts, latest.uncertainty or 0.0),
+            expanded(*doubts, latest.uncertainty or 0.0, stamps_us=self.stamp_error_us),
             "at most",
             len(last_us),
             key,
@@ -316,14 +309,9 @@ class _Log:
         figure = self._missed("emergencies", int(is_error.sum()), len(found.frames), note=note)
         yield self._located(figure, found.frames[is_error])
 
-    def _response(
-        self, stream: Stream, label: str, shortest_us: float, phases: Mapping[str, Any]
-    ) -> Iterator[RecordedFigure]:
-        """Response of a PDO after its SYNC; of a message, what its arrivals show of it."""
+    def _response(self, stream: Stream, label: str, worst_us: float) -> Iterator[RecordedFigure]:
+        """Response of a PDO after its SYNC."""
         quantity = f"{label}: response"
-        if stream.is_message:
-            yield from self._message_response(stream, quantity, shortest_us, phases)
-            return
         sent = [pdos for pdos in self.pdos if pdos.stream == stream]
         if not sent:
             return
@@ -333,25 +321,8 @@ class _Log:
             yield from self._after_sync(quantity, sent, self._last_us - slowest_us, self._doubts, _PERIOD)
             return
         group = next(group for group in self.network.groups if group.name == stream.group)
-        planned_us = group.read_execution_us + group.worst_extra_us + phases["worst_response_us"]
+        planned_us = group.read_execution_us + group.worst_extra_us + worst_us
         yield from self._after_sync(quantity, sent, planned_us, [group.read_uncertainty_us], group.key("execution"))
-
-    def _message_response(
-        self, stream: Stream, quantity: str, shortest_us: float, phases: Mapping[str, Any]
-    ) -> Iterator[RecordedFigure]:
-        """The latest arrival of a periodic message behind its earliest, which took its shortest frame or longer."""
-        sent = [
-            (sent, lateness(sent.periods, self.share))
-            for identifier in range(stream.first, stream.last + 1)
-            if (sent := self.by_identifier.get((identifier, stream.identifier_bits > BASE_BITS))) and sent.periods
-        ]
-        if not sent or "worst_response_us" not in phases:
-            return
-        latest, late = max(sent, key=lambda pair: pair[1].value)
-        planned_us, count = _finite(phases["worst_response_us"]), len(latest.times_us)
-        note = self.senders.name(stream, latest.identifier) if len(sent) > 1 else ""
-        figure = RecordedFigure(quantity, "us", planned_us, late.value + shortest_us, None, "shown", count, note=note)
-        yield self._located(figure, latest.frames, late.late_us)
 
     def _requests(self) -> Iterator[RecordedFigure]:
         """Requests and answers of a cycle without SYNC."""
@@ -369,13 +340,8 @@ class _Log:
         yield from log.figures(self._missed)
         self.edits |= log.edits
 
-    def _with_stamps(self, *uncertainties: float) -> float | None:
-        """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""
-        doubt_us = expanded(*uncertainties)
-        return None if doubt_us is None else doubt_us + self.stamp_error_us
-
-    def _stream(self, stream: Stream, label: str, spread_us: float | None) -> Iterator[RecordedFigure]:
-        """Period, jitter, data and format of a message or of SYNC; data and format of a PDO."""
+    def _stream(self, stream: Stream, label: str, shortest_us: float, worst_us: float) -> Iterator[RecordedFigure]:
+        """Period, jitter, data and format of a message or of SYNC, and response of a message; else data and format."""
         is_extended = stream.identifier_bits > BASE_BITS
         identifiers = range(stream.first, stream.last + 1)
         found = {identifier: self.by_identifier.get((identifier, is_extended)) for identifier in identifiers}
@@ -388,10 +354,12 @@ class _Log:
             return
         message = self.messages[stream.name] if stream.is_message else None
         key = f"message.{stream.name}" if message else ""
+        early_us = spread_us(stream, shortest_us, worst_us)
         if message:
-            yield from self._message(stream, label, recorded, spread_us)
+            yield from self.message_log.message(stream, label, recorded, early_us)
         elif stream.name == SYNC:
-            yield from self._sync(stream, recorded[0], spread_us)
+            yield from self.message_log.sync(stream, recorded[0], early_us)
+        self.edits |= self.message_log.edits
         count, most_bytes = sum(len(sent.times_us) for sent in recorded), max(sent.most_bytes for sent in recorded)
         planned = _format(message.fd, message.brs) if message else _format(self.has_switch, self.has_switch)
         planned_bytes = stream.data_bytes
@@ -410,105 +378,8 @@ class _Log:
             frames = joined(frames for _, frames in unlike)
             figure = _limited(f"{label}: frames of another format", 0, len(frames), count, key, note=note)
             yield self._located(figure, frames)
-
-    def _sync(self, stream: Stream, sent: can_timing.SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
-        """Period of SYNC, equal to that of the plan, and its jitter."""
-        periods, planned_us, count = periodic_events(sent.times_us), stream.period_us, len(sent.times_us)
-        period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, _PERIOD)
-        if periods is None:
-            yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
-            return
-        mean = can_timing.mean_period(sent.times_us, periods)
-        doubt_us = expanded(mean.uncertainty, _clocks_us(planned_us), self.stamp_error_us / count)
-        yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
-        if spread_us is not None:
-            late = lateness(periods, self.share)
-            doubt_us = self._with_stamps(late.uncertainty)
-            quantity = "SYNC: jitter of the arrival"
-            key = "bus.sync_jitter_us"
-            jitter = RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count, key)
-            jitter = self._located(jitter, sent.frames, late.late_us)
-            of_host = f"{key}, " if self.traffic.sync_jitter_us else ""
-            yield jitter._replace(note=f"planned: {of_host}the wait for other frames and stuff bits")
-            if jitter.verdict == "outside":
-                # All of it may be the host's: what other frames add is not known of any one SYNC.
-                self.edits |= latest_start(key, ceil(10 * late.value) / 10, events=count, share=self.share)
-
-    def _message(
-        self, stream: Stream, label: str, recorded: Sequence[can_timing.SentFrames], spread_us: float | None
-    ) -> Iterator[RecordedFigure]:
-        """Mean distance of a message, and how much sooner it comes than its period; of the identifier that is worst."""
-        key, planned_us = f"message.{stream.name}", stream.period_us
-        repeated = [sent for sent in recorded if len(sent.times_us) > 1]
-        if not repeated:
-            return
-
-        def identifier(sent: can_timing.SentFrames) -> str:
-            return self.senders.name(stream, sent.identifier) if len(recorded) > 1 else ""
-
-        often = min(repeated, key=lambda sent: sent.mean.value)
-        count, mean = len(often.times_us), often.mean
-        is_enough = count >= LEAST_EVENTS
-        notes = [identifier(often), "" if often.periods else "not periodic"]
-        if often.periods and often.periods.missing:
-            notes.append(f"{often.periods.missing:,} of {often.periods.places[-1] + 1:,} periods without a frame")
-        # At worst the first frame was the latest that it may be, and the last one the earliest.
-        scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
-        if mean.uncertainty is not None:
-            # A plan with bursts or jitter allows a row of frames that is so much faster.
-            allowed_us = (stream.burst - 1) * planned_us + stream.jitter_us
-            scatter_us = max(mean.uncertainty, allowed_us / (count - 1) / 2)
-        doubt_us = expanded(scatter_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
-        period = RecordedFigure(
-            f"{label}: period",
-            "us",
-            planned_us,
-            mean.value,
-            doubt_us if is_enough else None,
-            "at least" if is_enough else "shown",
-            count,
-            f"{key}.period_us",
-            ", ".join(filter(None, (*notes, "" if is_enough else _TOO_FEW))),
-            is_mean=True,
-        )
-        if is_enough and period.verdict == "outside":
-            self.edits[f"{key}.period_us"] = planned_us = round(mean.value, 1)
-        yield period
-        least_us = planned_us * (1 - float(CLOCK_TOLERANCE))
-        ahead_us = [(quantile(ahead(sent.times_us, least_us), self.share), sent) for sent in repeated]
-        sooner, sent = max(ahead_us, key=lambda pair: pair[0].value)
-        jitter = RecordedFigure(
-            f"{label}: sooner than its period",
-            "us",
-            spread_us,
-            sooner.value,
-            None if spread_us is None else (expanded(sooner.uncertainty or 0.0) or 0.0) + self.stamp_error_us,
-            "shown" if spread_us is None else "at most",
-            len(sent.times_us),
-            f"{key}.jitter_us",
-            identifier(sent),
-        )
-        early_us = ahead(sent.times_us, least_us)
-        if jitter.verdict == "outside" and spread_us is not None:
-            early_us = policed(sent.times_us, least_us, spread_us)
-        yield self._located(jitter, sent.frames, early_us)
-        if jitter.verdict == "outside":
-            model = can_timing.event_model(
-                sent.times_us, planned_us, stamp_error_us=self.stamp_error_us, tolerance=float(CLOCK_TOLERANCE)
-            )
-            self.edits[f"{key}.jitter_us"] = model.jitter_us
-            if model.burst > 1:
-                self.edits[f"{key}.burst"] = model.burst
-
-    def _spread_us(self, stream: Stream, shortest_us: float, phases: Mapping[str, Any] | None) -> float | None:
-        """Time by which the plan lets SYNC or a message come sooner than its period: R less the shortest frame [us].
-
-        All of a burst may come with its first.
-        """
-        if phases is None or not (stream.is_message or stream.name == SYNC):
-            return None
-        together_us = (stream.burst - 1) * stream.period_us
-        return _finite(max(phases["worst_response_us"] - shortest_us, 0.0) + together_us)
+        if message:
+            yield from self.message_log.response(stream, label, recorded, shortest_us, worst_us)
 
     def remarks(self) -> Iterator[str]:
         """Sentences on what the log has beside the figures."""
@@ -536,17 +407,7 @@ def _limited(
     return RecordedFigure(quantity, "1", most, number, None, "at most", events, key, note, hidden=hidden)
 
 
-def _clocks_us(period_us: float) -> float:
-    """Standard uncertainty of a period by the clocks of the bus and of the recorder [us]."""
-    return float(CLOCK_TOLERANCE * period_us / 3**0.5)
-
-
 def _format(is_fd: bool, switches: bool) -> str:
     if not is_fd:
         return _CLASSICAL
     return "CAN FD" if switches else "CAN FD without a switch of bit rate"
-
-
-def _finite(us: float) -> float | None:
-    """A planned time; None where a bus that is too full has none."""
-    return us if isfinite(us) else None

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain
-from math import inf
+from math import inf, isfinite
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ _EMERGENCY_BYTES: Final = 8
 """Data of an emergency: error code, error register and five bytes of the maker [bytes]."""
 
 
-class Senders:
+class SenderNames:
     """Streams of a plan, and the names of those who send their identifiers."""
 
     def __init__(self, network: Network, sent: Sequence[Stream]) -> None:
@@ -108,7 +108,7 @@ def pdos_beside_sync(
     sync: SentFrames,
     periods: PeriodicEvents,
     planned_us: float,
-    senders: "Senders",
+    senders: "SenderNames",
     by_identifier: Mapping[tuple[int, bool], SentFrames],
 ) -> Iterator[SentPdos]:
     """PDOs of each identifier beside SYNC, of which the recorded periods and the planned one are given [us]."""
@@ -145,6 +145,11 @@ def last_pdos_us(pdos: Sequence[SentPdos]) -> Floats:
 def joined(parts: Iterable[npt.NDArray[np.generic]]) -> npt.NDArray[Any]:
     """Arrays one after the other; an empty one of none."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts])
+
+
+def finite(us: float) -> float | None:
+    """A planned time; None where a bus that is too full has none [us]."""
+    return us if isfinite(us) else None
 
 
 class Emergencies(NamedTuple):

@@ -175,9 +175,8 @@ class CanBus(BusSection):
     @property
     def host_doubt_us(self) -> Number:
         """Standard uncertainty of the host's own time [us]."""
-        if self.host_uncertainty_us is not None:
-            return self.host_uncertainty_us
-        return time_uncertainty_us(self.host_us, is_guess=self.host_grade in (None, "assumed"))
+        is_guess = self.host_grade in (None, "assumed")
+        return time_uncertainty_us(self.host_us, is_guess=is_guess, given_us=self.host_uncertainty_us)
 
     def adapter_key(self, name: str) -> str:
         """Dotted key that gives a number of the adapter: its own, or that of the word."""

@@ -11,7 +11,7 @@ from busplan.buses.can.cycle import WORST_STUFFING, can_cycle
 from busplan.buses.can.due import due_pdos
 from busplan.buses.can.equations import BASE_BITS
 from busplan.buses.can.logged import wire_times
-from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, Senders, emergencies
+from busplan.buses.can.recorded_cycles import EMERGENCY, Ints, SenderNames, emergencies
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import NAMES, SYNC, answer_us
 from busplan.buses.network import Network, hyperperiod, numbers_by_due
@@ -102,7 +102,7 @@ class _CanCycles(RecordedCycles):
         self.begin_us = float(stretch.times_us[0]) - frames.lead_us
         """Time of the first frame of the recording [us]."""
         self.key = frames.identifiers[stretch.taken] * 2 + frames.extended[stretch.taken]
-        self.names = Senders(network, streams(traffic))
+        self.names = SenderNames(network, streams(traffic))
         self.senders = dict(self._senders())
         self.places = {key: np.flatnonzero(self.key == key) for key in self.senders}
         self.anchor = self._anchor()

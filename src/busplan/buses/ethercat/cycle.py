@@ -36,8 +36,8 @@ from busplan.buses.ethercat.frames import (
     rates,
 )
 from busplan.buses.figure import NONPERIODIC
-from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network, Rate
+from busplan.buses.parts import EventKind
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, larger, named, rounded_up, square_root, step, total
 

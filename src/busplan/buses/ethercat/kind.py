@@ -23,23 +23,9 @@ from busplan.buses.ethercat.equations import (
     room_bytes,
 )
 from busplan.buses.ethercat.frames import data_bytes, datagrams, layout, moves_us
-from busplan.buses.limits import (
-    NODE_LIMIT,
-    NOT_SHOWN_KEPT,
-    Cost,
-    ExactLimit,
-    Key,
-    Limit,
-    PayloadRange,
-    Perturbation,
-    Setting,
-    ShareOfPeriod,
-    Starter,
-    TimingModel,
-    WakeUp,
-    nodes_limit,
-)
+from busplan.buses.limits import NODE_LIMIT, NOT_SHOWN_KEPT, ExactLimit, Limit, ShareOfPeriod, WakeUp, nodes_limit
 from busplan.buses.network import Group, Network
+from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
 from busplan.buses.waterfall import RecordedCycles
 from busplan.elementwise import Number, choose, larger

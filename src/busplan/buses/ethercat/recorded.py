@@ -26,7 +26,7 @@ from busplan.buses.ethercat.frames import (
 from busplan.buses.ethercat.port_times import line_delays
 from busplan.buses.ethercat.recorded_cycles import Ints, SeenCycles, seen_cycles, trips
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of, latest_start
+from busplan.buses.rule import Recorded, RecordedFigure, clocks_us, day_of, latest_start
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -197,8 +197,7 @@ class Seen:
         if periods is None:
             yield from (figure._replace(hidden=self.too_few or self.bad_stamps) for figure in (period, start))
             return
-        clocks_us = CLOCK_TOLERANCE * period_us / 3**0.5
-        doubt = expanded(periods.uncertainty_us, clocks_us, self.stamp_us / count)
+        doubt = expanded(periods.uncertainty_us, clocks_us(period_us), self.stamp_us / count)
         yield period._replace(recorded=periods.period_us, uncertainty=doubt)
         deviation_us = float(np.std(np.diff(periods.late_us)))
         yield RecordedFigure("standard deviation of the period", "us", None, deviation_us, None, "shown", count - 1)

@@ -110,9 +110,8 @@ class EthercatBus(BusSection):
     @property
     def master_doubt_us(self) -> Number:
         """Standard uncertainty of the master's own time [us]."""
-        if self.master_uncertainty_us is not None:
-            return self.master_uncertainty_us
-        return time_uncertainty_us(self.master_us, is_guess=self.master_grade in (None, "assumed"))
+        is_guess = self.master_grade in (None, "assumed")
+        return time_uncertainty_us(self.master_us, is_guess=is_guess, given_us=self.master_uncertainty_us)
 
 
 class EthercatNode(NodeSection):

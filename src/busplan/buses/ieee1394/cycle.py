@@ -27,8 +27,8 @@ from busplan.buses.ieee1394.transactions import (
     link_of,
     safe_gap_count_of,
 )
-from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
+from busplan.buses.parts import EventKind
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, is_everywhere, is_off, larger, named, rounded_down, smaller, step, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind

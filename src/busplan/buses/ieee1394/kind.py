@@ -23,7 +23,8 @@ from busplan.buses.ieee1394.transactions import (
     is_broadcast,
     safe_gap_count_of,
 )
-from busplan.buses.limits import (
+from busplan.buses.network import Network
+from busplan.buses.parts import (
     Cost,
     Key,
     MeasuredLatencies,
@@ -36,7 +37,6 @@ from busplan.buses.limits import (
     TimingModel,
     Value,
 )
-from busplan.buses.network import Network
 from busplan.english import plural
 from busplan.errors import BusplanError
 

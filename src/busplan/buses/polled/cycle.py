@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias, cast
 
 from busplan.buses.cycle import ALL, BUT_FIRST, FIRST, BusCycle, BusEvent, Doubt, Premise, Rounds, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
-from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
+from busplan.buses.parts import EventKind
 from busplan.buses.polled.protocols import (
     TOGETHER,
     AdapterFigures,

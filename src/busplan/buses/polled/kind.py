@@ -6,10 +6,10 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.limits import (
-    NODE_LIMIT,
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, WakeUp
+from busplan.buses.network import Network
+from busplan.buses.parts import (
     Cost,
-    ExactLimit,
     Key,
     PayloadRange,
     Perturbation,
@@ -17,9 +17,7 @@ from busplan.buses.limits import (
     Starter,
     TimingModel,
     Value,
-    WakeUp,
 )
-from busplan.buses.network import Network
 from busplan.buses.polled.cycle import EVENTS, FIGURES, STANDARD, STRETCHES, TYPICAL, PolledCycle
 from busplan.buses.polled.protocols import FASTEST_FIRST, NO_ADAPTER, adapter_of, c, protocol_of
 from busplan.elementwise import Number, larger

@@ -201,9 +201,8 @@ class PolledBus(BusSection):
     @property
     def host_doubt_us(self) -> Number:
         """Standard uncertainty of the host's own time [us]."""
-        if self.host_uncertainty_us is not None:
-            return self.host_uncertainty_us
-        return time_uncertainty_us(self.host_us, is_guess=self.host_grade == "assumed")
+        is_guess = self.host_grade == "assumed"
+        return time_uncertainty_us(self.host_us, is_guess=is_guess, given_us=self.host_uncertainty_us)
 
     def _problems(self) -> Iterator[Problem]:
         protocol = protocol_of(self)

@@ -7,8 +7,9 @@ from typing import Final, Literal
 
 from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, Premise, Run
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, OwnFigures
-from busplan.buses.limits import EventKind, Periods
+from busplan.buses.limits import Periods
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.buses.sercos.shared import DELAYS, SercosCycle, delays, word_bytes
 from busplan.elementwise import Number, choose, rounded_down, step, total
 from busplan.sourced import Constants

@@ -3,17 +3,9 @@
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
-from busplan.buses.limits import (
-    NODE_LIMIT,
-    ExactLimit,
-    Key,
-    PayloadRange,
-    Perturbation,
-    TimingModel,
-    nodes_limit,
-    period_limit,
-)
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, nodes_limit, period_limit
 from busplan.buses.network import Network
+from busplan.buses.parts import Key, PayloadRange, Perturbation, TimingModel
 from busplan.buses.sercos.sercos2 import (
     EVENTS,
     FIGURES,

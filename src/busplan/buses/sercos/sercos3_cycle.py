@@ -6,8 +6,8 @@ from typing import Final, Literal
 
 from busplan.buses.cycle import BusEvent, BusLatency, Doubt, Premise, Run
 from busplan.buses.figure import NONPERIODIC
-from busplan.buses.limits import EventKind
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.buses.sercos.sercos3 import (
     MDT_TELEGRAMS,
     SORTS,

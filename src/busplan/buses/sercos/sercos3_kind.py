@@ -4,20 +4,9 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import ClassVar, Final
 
-from busplan.buses.limits import (
-    NODE_LIMIT,
-    Cost,
-    ExactLimit,
-    Key,
-    PayloadRange,
-    Perturbation,
-    Setting,
-    TimingModel,
-    WakeUp,
-    nodes_limit,
-    period_limit,
-)
+from busplan.buses.limits import NODE_LIMIT, ExactLimit, WakeUp, nodes_limit, period_limit
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, TimingModel
 from busplan.buses.sercos.sercos3 import (
     FIGURES,
     PERIODS,

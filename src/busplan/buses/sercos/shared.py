@@ -9,8 +9,9 @@ from typing import Final, TypeAlias
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusLatency
 from busplan.buses.figure import Figure
-from busplan.buses.limits import Key, Starter, unknown_period
+from busplan.buses.limits import unknown_period
 from busplan.buses.network import Network
+from busplan.buses.parts import Key, Starter
 from busplan.buses.rule import read_rules
 from busplan.elementwise import Number, larger, rounded_up, total
 from busplan.sections.base import TRANSACTION_KINDS

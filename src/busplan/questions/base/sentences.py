@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION, Figure
-from busplan.buses.limits import Value as BusValue
 from busplan.buses.network import Network
+from busplan.buses.parts import Value as BusValue
 from busplan.buses.published import Tested
 from busplan.forms import blocks
 from busplan.forms.numbers import known_decimals, known_text

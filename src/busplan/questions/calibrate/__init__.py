@@ -9,8 +9,8 @@ from pathlib import PurePath
 from statistics import median, stdev
 from typing import Any, Final, NamedTuple, Protocol
 
-from busplan.buses.limits import MeasuredLatencies, PacketTime
 from busplan.buses.network import Network
+from busplan.buses.parts import MeasuredLatencies, PacketTime
 from busplan.english import plural
 from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report

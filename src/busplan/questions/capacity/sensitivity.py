@@ -7,8 +7,8 @@ from math import floor, inf, log10
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Term
-from busplan.buses.limits import Perturbation
 from busplan.buses.network import Network
+from busplan.buses.parts import Perturbation
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import FITS, TIME, certainty
 from busplan.questions.fit.figures import CycleFigures, cycle_figures

@@ -5,7 +5,7 @@ from itertools import chain
 from typing import Final
 
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, BusFigures, by_key, unit_of
-from busplan.buses.limits import Safety
+from busplan.buses.parts import Safety
 from busplan.english import listed, nouns
 from busplan.forms import blocks, charts
 from busplan.forms.numbers import decimals_of, known_decimals, period_value, sentence_text

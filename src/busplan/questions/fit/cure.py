@@ -8,8 +8,8 @@ from itertools import product
 from math import ceil, inf
 from typing import Final, NamedTuple, Self, TypeAlias
 
-from busplan.buses.limits import Cost, Value
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, Value
 from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import ArgumentError, BusplanError
 from busplan.questions.fit.figures import FitFigures

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self, TypeAlias
 
 from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.figure import WAITS, BusFigures, OwnFigures, Sort, Wait
-from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit, Safety
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
+from busplan.buses.parts import Safety
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, existing, is_off, larger, total, within
 from busplan.errors import BusplanError

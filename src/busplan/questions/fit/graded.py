@@ -5,8 +5,8 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.bus import Bus
-from busplan.buses.limits import Key
 from busplan.buses.network import Network
+from busplan.buses.parts import Key
 from busplan.elementwise import GivenTable, Traced
 from busplan.profile.document import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.buses.can.equations import BASE_BITS, USUAL_DATA_BIT_RATE, frame_us
-from busplan.buses.rule import CLOCK_TOLERANCE
+from busplan.buses.rule import clocks_us
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -187,7 +187,7 @@ def _fullest(messages: Sequence[can_timing.SentFrames], stretch: can_timing.Cloc
 def _periodic(sent: can_timing.SentFrames, stretch: can_timing.ClockStretch) -> _Timing:
     """Period and jitter of a message that comes once a period."""
     period_us, error_us = sent.mean
-    doubt_us = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
+    doubt_us = expanded(error_us, clocks_us(period_us)) or 0.0
     return _covering(sent, period_us, doubt_us / 2, stretch)._replace(uncertainty_us=doubt_us)
 
 

@@ -12,8 +12,8 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
 import numpy as np
 
 from busplan.buses.figure import BusFigures
-from busplan.buses.limits import Safety, Value
 from busplan.buses.network import Network
+from busplan.buses.parts import Safety, Value
 from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report

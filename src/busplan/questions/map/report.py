@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN_CORRECTED, UNCERTAINTY, Ink, unit_of
-from busplan.buses.limits import Value
+from busplan.buses.parts import Value
 from busplan.english import nouns
 from busplan.forms import blocks, charts
 from busplan.forms.blocks import State as Tone

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
-from busplan.buses.limits import Value
 from busplan.buses.network import Network
+from busplan.buses.parts import Value
 from busplan.errors import ArgumentError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text

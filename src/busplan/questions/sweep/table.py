@@ -13,8 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.buses.figure import FITS, TIMING_MODEL, BusFigures, Figure, Sort, by_key
-from busplan.buses.limits import NOT_SHOWN_KEPT, Safety
+from busplan.buses.limits import NOT_SHOWN_KEPT
 from busplan.buses.network import Network
+from busplan.buses.parts import Safety
 from busplan.elementwise import Number
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored

@@ -9,8 +9,8 @@ from typing import Final, TypeGuard
 
 import numpy as np
 
-from busplan.buses.limits import Value
 from busplan.buses.network import Network
+from busplan.buses.parts import Value
 from busplan.english import listed
 from busplan.errors import ArgumentError, BusplanError
 from busplan.profile.changes import without_units

@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
-from busplan.buses.limits import IDLE, EventKind
 from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
+from busplan.buses.parts import IDLE, EventKind
 from busplan.elementwise import Number, existing, is_over
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import available_us, certainty
