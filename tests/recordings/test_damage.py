@@ -292,6 +292,13 @@ def test_many_channels_and_long_names_are_shortened(tmp_path: Path) -> None:
     assert len(str(caught.value)) < 1000
 
 
+def test_a_log_of_more_identifiers_than_any_machine_has_is_refused(tmp_path: Path) -> None:
+    log = tmp_path / "identifiers.log"
+    log.write_text("".join(f"({number / 1000:.6f}) can0 {number:08X}#11\n" for number in range(20_001)))
+    with pytest.raises(BusplanError, match=r"has 20,001 identifiers; of a log at most 20,000 are read"):
+        busplan.measured("can-servo-8", log)
+
+
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="this system does not list open files")
 def test_a_damaged_blf_is_closed(tmp_path: Path) -> None:
     log = tmp_path / "damaged.blf"

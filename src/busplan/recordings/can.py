@@ -69,6 +69,8 @@ _MOST_LINE_BYTES: Final = 4096
 """Longest line of a log of text; a frame has under 300 bytes."""
 _MOST_FRAMES: Final = 2_000_000
 """Most frames of a log that are read, an hour of a busy bus: they bound the memory."""
+_MOST_IDENTIFIERS: Final = 20_000
+"""Most identifiers of a log, many times those of a machine: each has figures of its own, and they bound the memory."""
 _MOST_CHANNELS: Final = 256
 """Most channels of a log."""
 _SHOWN_CHANNELS: Final = 8
@@ -418,6 +420,8 @@ class _Log:
             )
         rows, errors = np.frombuffer(self._rows, _ROW_FIELDS), np.frombuffer(self._errors, _ERROR_FIELDS)
         stamps, flags = rows["stamp_s"], rows["flags"]
+        if (count := len(np.unique(rows["identifier"]))) > _MOST_IDENTIFIERS:
+            raise BusplanError(f"{path}: has {count:,} identifiers; of a log at most {_MOST_IDENTIFIERS:,} are read")
         identifiers, sizes = rows["identifier"].astype(np.int64), rows["dlc"].astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
         extended, remote, fd, switched = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD, _SWITCHED))

@@ -343,6 +343,13 @@ def test_rates_that_meet_too_seldom_are_refused() -> None:
     assert "group.g1.every" in str(refused.value)
 
 
+def test_of_many_groups_only_a_short_hyperperiod_is_computed() -> None:
+    many = [(1, 1, 20 + number % 2, 12) for number in range(500)]
+    with pytest.raises(BusplanError, match="only after 1000 cycles; busplan computes at most 100 of 500 groups"):
+        busplan.load_profile(profile(many), changes={"group.g1.every": 1000})
+    assert busplan.load_profile(profile(many), changes={"group.g1.every": 100})
+
+
 def test_a_circle_needs_axes_in_every_cycle() -> None:
     plan = profile([(1, 4, 20, 12), (2, 4, 20, 12)], axes=1, distributed_clocks=True)
     circle = busplan.load_profile(plan, changes={"circle.radius_mm": 10.0})

@@ -2,6 +2,7 @@
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from itertools import chain
 from math import lcm
 from typing import Final, NamedTuple
@@ -192,6 +193,8 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
 
 MOST_CYCLES: Final = 1000
 """Longest hyperperiod that is computed [cycles]."""
+_MOST_PLACES: Final = 50_000
+"""Most groups times cycles of their hyperperiod: they bound the memory."""
 
 
 class Unit(NamedTuple):
@@ -226,13 +229,14 @@ class UnitCycle(NamedTuple):
 def checked_hyperperiod(rates: Sequence[int]) -> int:
     """Number of cycles after which all units repeat [1].
 
-    Raises `BusplanError` where it exceeds `MOST_CYCLES`.
+    Raises `BusplanError` where it exceeds `MOST_CYCLES`, or less for many groups.
     """
-    cycles = lcm(*rates)
-    if cycles > MOST_CYCLES:
+    cycles, most = lcm(*rates), _MOST_PLACES // max(len(rates), 1)
+    if cycles > min(most, MOST_CYCLES):
         shown = ", ".join(map(str, sorted(set(rates))))
+        most_words = f"{MOST_CYCLES}" if most >= MOST_CYCLES else f"{most} of {len(rates)} groups"
         raise BusplanError(
-            f"the rates of {shown} repeat together only after {cycles} cycles; busplan computes at most {MOST_CYCLES}"
+            f"the rates of {shown} repeat together only after {cycles} cycles; busplan computes at most {most_words}"
         )
     return cycles
 
@@ -261,7 +265,7 @@ def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
     return tuple(Rate(unit.every, start + 1) for unit, start in zip(units, starts, strict=True))
 
 
-@cached(maxsize=1 << 12)
+@cached(maxsize=1 << 8)
 def unit_cycles(
     units: tuple[Unit, ...], *, is_spread: bool, datagrams: int, first_bytes: float
 ) -> tuple[UnitCycle, ...]:
@@ -272,7 +276,7 @@ def unit_cycles(
     """
     cycles = []
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
-        present = [unit.present(is_due=is_due) for unit, is_due in zip(units, due, strict=True)]
+        present = [unit.present(is_due=True) for unit, is_due in zip(units, due, strict=True) if is_due]
         packed = pack(present, datagrams=datagrams, first_bytes=first_bytes)
         data_bytes = sum(group.number * group.data_bytes for group in present)
         cycles.append(UnitCycle(due, numbers, packed.wire_bytes, packed.last_bytes, data_bytes))
@@ -319,10 +323,19 @@ def devices(network: Network) -> tuple[Devices, ...]:
     if not has_rates(network):
         return whole
     numbers = _cycle_inputs(network, whole)
+    if all(isinstance(number, int | float) for number in numbers):
+        is_there = _cycles(network, numbers)[0].due
+        return tuple(
+            entry if is_due else entry._replace(data_bytes=0) for entry, is_due in zip(whole, is_there, strict=True)
+        )
+
+    @cache  # every group asks of the same numbers
+    def due(*numbers: float) -> tuple[bool, ...]:
+        return _cycles(network, numbers)[0].due
 
     def is_in(index: int) -> Number:
         words = "whether the group goes in the fullest cycle"
-        return pointwise(lambda *numbers: float(_cycles(network, numbers)[0].due[index]), *numbers, words=words)
+        return pointwise(lambda *numbers: float(due(*numbers)[index]), *numbers, words=words)
 
     return tuple(
         entry._replace(data_bytes=choose(is_in(index) > 0, entry.data_bytes, 0)) if group.is_slower else entry
