@@ -95,12 +95,13 @@ def test_too_many_elements_are_refused_at_their_line(tmp_path: Path, monkeypatch
         busplan.import_profile(tmp_path / "machine.xml")
 
 
+MANY: Final = 300_000
 LONG = {
-    "spaces in a line": "[DeviceInfo]\n" + " " * 1_000_000 + "x\n",
-    "empty lines": "\n" * 1_000_000 + "[DeviceInfo]\n",
-    "spaces in a name": "=== Master 0, Slave 0 ===\n  Order number: x" + " " * 1_000_000 + "y\n",
-    "spaces behind a key": "Slave:1\n Name:x" + " " * 1_000_000 + "y\n",
-    "spaces in a message": "BO_ 1 A: 8 X\n" + " " * 1_000_000 + "SG_ " + " " * 1_000_000 + "x\n",
+    "spaces in a line": "[DeviceInfo]\n" + MANY * " " + "x\n",
+    "empty lines": MANY * "\n" + "[DeviceInfo]\n",
+    "spaces in a name": "=== Master 0, Slave 0 ===\n  Order number: x" + MANY * " " + "y\n",
+    "spaces behind a key": "Slave:1\n Name:x" + MANY * " " + "y\n",
+    "spaces in a message": "BO_ 1 A: 8 X\n" + MANY * " " + "SG_ " + MANY * " " + "x\n",
 }
 
 
