@@ -1,6 +1,7 @@
 """`busplan import` of a CAN log: what a simulated bus was given is found again, and the log is within the profile."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Any, Final, NamedTuple
@@ -326,10 +327,15 @@ def test_a_bus_of_250_kbit_s_is_not_taken_for_500_by_coarse_stamps(tmp_path: Pat
         imported(candump(logged), tmp_path)
 
 
+@cache
+def shaken() -> tuple[list[Queued], list[Logged]]:
+    queued = random_queue(jitter_us=800.0)
+    return queued, arbitrated(queued, bit_us=2.0)
+
+
 @pytest.mark.parametrize("step_us", [pytest.param(1.0, marks=pytest.mark.slow), 100.0, 1000.0])
 def test_no_response_is_below_the_delay_of_a_bus_with_coarse_stamps(step_us: float, tmp_path: Path) -> None:
-    queued = random_queue(jitter_us=800.0)
-    logged = arbitrated(queued, bit_us=2.0)
+    queued, logged = shaken()
     answer = imported(candump(coarse(logged, step_us)), tmp_path, bit_rate_kbit_s=500)
     names = {message.identifier: message.name for message in can_profile(answer).message}
     rows = [row for row in busplan.latency(answer.profile).transactions if row.timing_model == "worst-stuffing"]
