@@ -112,7 +112,7 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
 
 def test_a_grid_that_is_computed_in_pieces_is_one_table() -> None:
     # More points than are computed at once, before and behind the key that is cut; each line alone is in one piece.
-    lines = {"cycle.nonperiodic_us": np.linspace(0, 1900, 3000)}
+    lines = {"cycle.nonperiodic_us": np.linspace(0, 1900, 6000)}
     gaps, nodes = [63, "optimal"], (1, 3, 17)
     whole = busplan.sweep(
         "paper-4ms", vary={"bus.gap_count": gaps, **lines, "bus.nodes": nodes}, timing_model="standard"
