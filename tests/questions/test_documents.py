@@ -25,7 +25,7 @@ EVERY: dict[str, Callable[[str], Any]] = {
     "timeline": busplan.timeline,
     "check": busplan.check,
     "map": busplan.map_,
-    "compare": busplan.compare,
+    "compare --buses can,ieee1394": lambda profile: busplan.compare(profile, buses=["can", "ieee1394"]),
     "explain": busplan.explain,
     "report --no-circle": lambda profile: busplan.report(profile, circle=False),
 }

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 import pytest
@@ -11,10 +12,17 @@ from busplan.forms.blocks import Report, Sentence, ShownValue, Table
 
 ROUGH = {"circle.radius_mm": 25.0, "circle.ramp_periods": 20, "tolerance.max_contour_error_mm": 0.001}
 SPREAD = [(4, 50.0 if index % 4 else 90.0 + index, "write") for index in range(60)]
+
+
+@cache
+def evidence() -> busplan.EvidenceAnswer:
+    return busplan.evidence("ieee1394")
+
+
 ANSWERS: Mapping[str, tuple[Callable[[], Any], int]] = {
     # Tables of 44 figures, two periods under two models.
     "capacity": (lambda: busplan.capacity("paper-1ms", period_us=[4000.0, 600.0]), 100),
-    "sensitivity": (lambda: busplan.capacity("gantry-24", sensitivity=True), 50),
+    "sensitivity": (lambda: busplan.capacity("paper-1ms", sensitivity=True), 50),
     "latency": (lambda: busplan.latency("paper-1ms", payload_bytes=[4, 16]), 2 * 4 * 21 - 1),
     "circle": (
         lambda: busplan.circle_test(
@@ -24,7 +32,7 @@ ANSWERS: Mapping[str, tuple[Callable[[], Any], int]] = {
     ),
     "timeline": (lambda: busplan.timeline(busplan.load_profile("paper-4ms", changes={"cycle.period_us": 300.0})), 15),
     "calibrate": (lambda: busplan.calibrate("paper-two-node", SPREAD, source="m.csv"), 6),
-    "evidence": (lambda: busplan.evidence("ieee1394"), 100),
+    "evidence": (evidence, 100),
     "report": (lambda: busplan.report("paper-4ms", circle=False), 200),
 }
 
@@ -66,6 +74,6 @@ def test_every_figure_is_one_of_the_document(name: str, values_in: Callable[[obj
 
 
 def test_every_comparison_of_the_evidence_stands_once(values_in: Callable[[object], Iterator[ShownValue]]) -> None:
-    answer = busplan.evidence("ieee1394")
+    answer = evidence()
     shown = [value.value for value in values_in(tuple(answer.report().blocks)) if value.key == "computed"]
     assert Counter(shown) == Counter(row["computed"] for row in answer.to_dict()["figures"])

@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
 from busplan.sections.base import value_at
-from tests.registers import shipped_of_each_kind
+from tests.registers import at_least, shipped_of_each_kind, some
 
 Maker = Callable[..., busplan.Profile]
 TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
@@ -60,17 +60,22 @@ def next_bottleneck(profile: busplan.Profile) -> Any:
     return busplan.capacity(profile, sensitivity=True).sensitivities[0].next_bottleneck
 
 
+@settings(max_examples=at_least(4))
 @given(data=st.data(), per_axis=st.sampled_from([None, 1, 8]), reserve=st.sampled_from([0.0, 0.2]))
-def test_each_row_is_the_capacity_of_the_profile_with_that_change(
+def test_each_row_is_the_capacity_of_the_profile_with_that_change_and_the_largest_comes_first(
     data: st.DataObject, per_axis: int | None, reserve: float, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     changes = {"payload.read_bytes_per_axis": per_axis, "limits.reserve": reserve}
     profile = changed(data.draw(any_profile), changes)
     before, by_change = figures(profile), effects(profile)
     assert set(by_change) == set(WRITTEN)
+    # What cannot be made comes last.
+    sizes = [-1.0 if effect.margin_change_us is None else abs(effect.margin_change_us) for effect in by_change.values()]
+    assert sizes == sorted(sizes, reverse=True)
     for change, effect in by_change.items():
         if change == "one more hop" and value_at(profile, "bus.max_hops") is None:
             assert (effect.margin_change_us, effect.then) == (None, None)
+            assert effect.note
             continue
         after = figures(changed(profile, WRITTEN[change](profile)))
         assert effect.then is not None
@@ -84,16 +89,6 @@ def test_each_row_is_the_capacity_of_the_profile_with_that_change(
             after.safe,
             after.exceeded,
         )
-
-
-@given(data=st.data())
-def test_the_largest_effect_comes_first_and_what_cannot_be_made_last(
-    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
-) -> None:
-    ranked = [*effects(data.draw(any_profile)).values()]
-    sizes = [-1.0 if effect.margin_change_us is None else abs(effect.margin_change_us) for effect in ranked]
-    assert sizes == sorted(sizes, reverse=True)
-    assert all(effect.note for effect in ranked if effect.then is None)
 
 
 def test_what_adds_to_the_margin_has_its_place_by_its_size(make: Maker) -> None:
@@ -168,7 +163,7 @@ def test_a_change_that_the_profile_refuses_is_said_so(make: Maker) -> None:
 def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
     gantry = busplan.load_profile("gantry-24")
     rows, now = effects(gantry), figures(gantry)
-    for group in gantry.group:
+    for group in gantry.group[::2]:
         for change, key, more in (
             (f"one more node in {group.name}", "nodes", group.nodes + 1),
             (f"one more axis per node in {group.name}", "axes", group.axes + 1),
@@ -195,7 +190,7 @@ def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -
 # --- the next bottleneck ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", shipped_of_each_kind())
+@pytest.mark.parametrize("name", some(shipped_of_each_kind(), 4))
 def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: str) -> None:
     profile = busplan.load_profile(name)
     bottleneck = next_bottleneck(profile)
@@ -236,6 +231,7 @@ def test_a_term_goes_with_its_cause(make: Maker, changes: dict[str, Any], bindin
     assert bottleneck.next_binding_term.key != binding
 
 
+@settings(max_examples=at_least(5))
 @given(data=st.data())
 def test_without_the_limit_the_next_one_keeps_one_node_more_off(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
-from tests.registers import shipped_names
+from tests.registers import shipped_of_each_kind
 
 Make = Callable[..., busplan.Profile]
 
@@ -53,7 +53,7 @@ def test_the_papers_test(name: str) -> None:
     assert (result.path, result.circular_deviation_mm, result.settled) == ("trapezoid", None, None)
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", shipped_of_each_kind())
 def test_every_shipped_profile_runs_and_passes_what_it_asks_for(name: str) -> None:
     profile = busplan.load_profile(name)
     result = only(profile)

@@ -7,7 +7,10 @@ import pytest
 
 import busplan
 
-EACH = pytest.mark.parametrize("name", ["can-servo-8", "dvrk", "gantry-24", "paper-1ms"])
+EACH = pytest.mark.parametrize(
+    "name",
+    ["gantry-24", *(pytest.param(name, marks=pytest.mark.slow) for name in ("can-servo-8", "dvrk")), "paper-1ms"],
+)
 
 
 @cache

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -14,6 +14,7 @@ import busplan
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
 from tests.oracles.ieee1394_cycle import exact_safe_required_us
+from tests.registers import at_least
 
 Maker = Callable[..., busplan.Profile]
 HALVES_US = {4: 6, 16: 6.3, 32: 6.6, 64: 7.5, 128: 9.1, 256: 11.5, 512: 16.9, 1024: 27.4}
@@ -197,6 +198,7 @@ def _drawn_us(profile: busplan.Profile) -> NDArray[np.float64]:
     return np.asarray(required_us + halves * (HALF_U_US * normal(draws) + gap_term_us * uniform))
 
 
+@settings(max_examples=at_least(4))
 @given(data=st.data())
 def test_more_bias_or_reserve_never_improves_and_more_uncertainty_never_shows(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
@@ -218,6 +220,7 @@ def _rank(figures: Any) -> int:
     return ("fits", "not shown to fit", "does not fit").index(figures.verdict)
 
 
+@settings(max_examples=at_least(5))
 @given(data=st.data())
 def test_no_faster_node_and_no_shorter_cable_makes_a_verdict_worse(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

@@ -17,6 +17,7 @@ import busplan
 from busplan.errors import BusplanError
 from busplan.recordings.can_bits import written_bits
 from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump, servo_8
+from tests.registers import at_least
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess
@@ -62,7 +63,7 @@ def test_the_bits_of_a_frame_are_those_written_one_by_one(frames: list[Queued], 
     assert bits.tolist() == [bits_of(frame) for frame in frames]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(at_least(2)))
 def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> None:
     logged = arbitrated(servo_8(300, seed=seed))
     answer = of_log(candump(logged), tmp_path)
@@ -176,8 +177,8 @@ def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_p
 def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     late = [frame._replace(us=frame.us + 3000 * (frame.identifier == 0x208)) for frame in servo_8(100)]
     shaken = arbitrated(servo_8(300, sync_jitter_us=900))
-    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
-    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
+    jitter = figure(of_log(candump(shaken), tmp_path), "SYNC: jitter")
+    assert (jitter.recorded, jitter.verdict) == (pytest.approx(900, abs=150), "outside")
     # The drives may be slower than assumed; where their time is measured, the PDO is late.
     assert figure(of_log(candump(arbitrated(late)), tmp_path), "last PDO").verdict == "not shown"
     plan = busplan.load_profile(PLAN, changes={"node.execution.grade": "measured"})
@@ -330,7 +331,7 @@ def test_a_damaged_log_says_where(tmp_path: Path) -> None:
                     )
                 )
         content, random = path.read_bytes(), Random(1)
-        for _ in range(15):
+        for _ in range(at_least(5)):
             # python-can's reader of BLF leaves a file open whose head is cut.
             end = random.randrange(200 if ending == "blf" else 4, len(content))
             path.write_bytes(content[:end] + random.choice((b"", b"\xff\0\n", b"nonsense\n")))

@@ -88,6 +88,7 @@ def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
     arrow, pandas, polars = answer.to_arrow(), answer.to_pandas(), answer.to_polars()
     assert list(pandas) == polars.columns == arrow.column_names == list(answer)
     rows = len(answer["fits"])
+    assert list(pl.DataFrame(answer).columns) == list(answer)
     assert len(pandas) == len(polars) == arrow.num_rows == rows
     for name in ("bus.gap_count", "verdict", "safe_limited_by"):
         words = [word or None for word in answer[name].tolist()]
@@ -101,11 +102,11 @@ def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
 
 
 def test_pandas_makes_no_column_of_the_names() -> None:
-    pd, pl = needed("pandas"), needed("polars")
+    pd = needed("pandas")
     answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
     with pytest.raises(busplan.BusplanError, match=r"to_pandas\(\) gives a data frame, dict\(answer\) a dict"):
         pd.DataFrame(answer)
-    assert list(pd.DataFrame(dict(answer))) == list(pl.DataFrame(answer).columns) == list(answer)
+    assert list(pd.DataFrame(dict(answer))) == list(answer)
     assert answer == answer  # noqa: PLR0124 - a mapping of arrays would compare these
     assert len({answer, answer}) == 1
 

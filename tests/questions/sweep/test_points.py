@@ -98,8 +98,7 @@ def test_every_key_can_be_swept(name: str) -> None:
             require_points(profile, {key: some})
 
 
-@pytest.mark.parametrize("polls", [[0, 1], [2, 0]])
-@pytest.mark.parametrize("model", [None, "TwinCAT"])
+@pytest.mark.parametrize(("polls", "model"), [([0, 1], None), ([2, 0], "TwinCAT")])
 def test_the_last_frame_comes_again_where_no_mailbox_is_asked(
     tmp_path: Path, polls: list[float], model: str | None
 ) -> None:
