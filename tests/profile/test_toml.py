@@ -465,6 +465,11 @@ def test_a_byte_order_mark_is_stepped_over() -> None:
     assert read(b"\xef\xbb\xbf" + TEXT.encode()) == read(TEXT)
 
 
+def test_a_file_of_more_values_than_a_profile_has_is_refused_before_they_are_judged() -> None:
+    words = "f.toml:1:1: the file has 50,001 equals signs; a profile has 50,000 values at most"
+    assert the_problem("[[group]]\nx=1\n" * 50_001) == words
+
+
 def test_a_file_may_be_as_long_as_the_limit_and_no_longer() -> None:
     comment = "#" * (MAX_FILE_BYTES - len(TEXT))
     assert read(TEXT + comment).name == "test"

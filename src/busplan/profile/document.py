@@ -193,6 +193,8 @@ def _first_deep_bracket(text: str) -> int:
 
 MAX_FILE_BYTES: Final = 2_000_000
 """Size of the largest profile: some 10,000 messages of a CAN network, with their comments."""
+_MOST_VALUES: Final = 50_000
+"""Most equals signs of a profile, twice those of 2,048 messages with every key: each problem costs time and memory."""
 _KINDS: Final = ("bus", "bus.kind")
 """Keys whose change may require tables of another kind of bus."""
 _SOURCE: Final = "_source"
@@ -211,7 +213,7 @@ class LoadedProfile(NamedTuple):
 def decode(content: bytes, *, name: str) -> Document:
     """Decode the file of a profile.
 
-    A file that is too large or not UTF-8 raises PlacedError.
+    A file that is too large, has too many values or is not UTF-8 raises PlacedError.
     """
     if len(content) > MAX_FILE_BYTES:
         raise _machine_file(content, name) or too_large(name)
@@ -219,6 +221,9 @@ def decode(content: bytes, *, name: str) -> Document:
         text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
     except PlacedError as error:
         raise _machine_file(content, name) or error from None
+    if (count := text.count("=")) > _MOST_VALUES:
+        message = f"the file has {count:,} equals signs; a profile has {_MOST_VALUES:,} values at most"
+        raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
     # With LF alone, offsets of the parser and the scanner agree.
     return Document(name, text.replace("\r\n", "\n"))
 
