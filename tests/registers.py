@@ -21,9 +21,9 @@ QUICK: Final = 10
 """Random examples of a test by default."""
 
 
-def at_least(few: int) -> int:
-    """How many examples a test has that has so many by default: more under a larger profile of hypothesis."""
-    return ceil(few * settings().max_examples / QUICK)
+def at_least(few: int, many: int = 0) -> int:
+    """How many examples a test with few by default has: under a larger profile of hypothesis more, or `many`."""
+    return few if settings().max_examples == QUICK else max(many, ceil(few * settings().max_examples / QUICK))
 
 
 def some(values: Iterable[T], few: int) -> list[T]:

@@ -16,7 +16,7 @@ from busplan.buses.limits import ANY_PERIOD, Periods
 from tests.registers import at_least
 
 Run = Callable[..., Any]
-FEW = settings(max_examples=at_least(3))
+FEW = settings(max_examples=at_least(3, 28))
 KINDS = pytest.mark.parametrize("kind", ["sercos3", "sercos2"])
 KNOWN = Periods((31.25, 62.5, 125.0, 250.0, 500.0))
 

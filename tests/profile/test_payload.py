@@ -54,7 +54,7 @@ def standard(one: busplan.Profile) -> Any:
     return figures
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(fixed=st.integers(0, 60), per_axis=st.integers(1, 30), axes=st.integers(1, 12))
 def test_what_each_axis_adds_is_as_if_it_stood_in_the_payload(fixed: int, per_axis: int, axes: int) -> None:
     added = f"read_bytes_per_axis = {per_axis}\nwrite_bytes_per_axis = {per_axis}"

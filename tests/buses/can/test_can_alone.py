@@ -168,7 +168,7 @@ MESSAGES = st.lists(
 
 
 @given(MESSAGES, st.sampled_from([125, 500]))
-@settings(max_examples=at_least(15))
+@settings(max_examples=at_least(15, 120))
 def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
     messages: list[dict[str, Any]], rate: float
 ) -> None:
@@ -302,7 +302,7 @@ OF_BITS = {
 }
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(
     messages=st.lists(st.one_of(*OF_BITS.values()), min_size=1, max_size=4),
     bits=st.sampled_from([11, 29]),

@@ -593,7 +593,7 @@ def attacked(seed: int, networks: int, *, runs: int, kind: str = "") -> dict[str
 
 
 def test_no_simulated_run_takes_longer_than_the_model() -> None:
-    best = attacked(52, at_least(4), runs=100)
+    best = attacked(52, at_least(4, 60), runs=100)
     assert best.pop("networks")[0] > at_least(1)
     for name, (share, seed) in best.items():
         # Bounds are all but reached: a model that says less fails.
@@ -618,7 +618,7 @@ def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str,
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
 
 
-@pytest.mark.parametrize("seed", range(1, 1 + at_least(2)))
+@pytest.mark.parametrize("seed", range(1, 1 + at_least(2, 20)))
 def test_an_adapter_is_to_all_others_a_host_that_takes_as_long(seed: int) -> None:
     own = scene(Random(seed), kind="adapter")
     if own is not None:

@@ -107,7 +107,7 @@ MESSAGES: Final = st.lists(
 
 @pytest.mark.parametrize("form", FORMS)
 @given(messages=MESSAGES)
-@settings(max_examples=at_least(15))
+@settings(max_examples=at_least(15, 120))
 def test_a_simulation_reaches_each_response_and_never_passes_it(messages: list[dict[str, Any]], form: str) -> None:
     # Data at 1000 kbit/s: all frames are whole microseconds, with a switch of bit rate and without.
     found = latencies(network(*messages, data_bit_rate_kbit_s=1000), form=form)

@@ -130,7 +130,7 @@ def test_three_frames_in_a_cycle() -> None:
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
 
 
-@settings(max_examples=at_least(6))
+@settings(max_examples=at_least(6, 40))
 @given(st.integers(1, 1474), st.booleans(), st.booleans(), st.integers(0, 1), st.integers(300, 4000))
 def test_all_numbers_of_devices_up_to_the_most_fit_and_no_more_than_it_takes_are_denied(
     size: int, clocks: bool, apart: bool, polls: int, period_us: int

@@ -137,7 +137,7 @@ def test_the_header_of_a_domain_takes_room_of_the_frame(size: int, frames: int) 
     assert drawn_us == pytest.approx(result.required_us, rel=1e-12)
 
 
-@settings(max_examples=at_least(7))
+@settings(max_examples=at_least(7, 60))
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans(), st.lists(STARTS, min_size=5, max_size=5))
 def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     groups: list[Rated], units: str, clocks: bool, starts: list[str]
@@ -231,7 +231,7 @@ def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated],
     assert whole.cycle_events == busplan.timeline(plan, cycle=whole.to_dict()["cycle"]).cycle_events
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(GROUPS)
 def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -> None:
     without = deciding(profile([(1, nodes, read, write) for _, nodes, read, write in groups]))

@@ -211,7 +211,7 @@ def allowance_us(case: Case, simulated: ModuleType) -> float:
 
 @pytest.mark.parametrize("alone", [False, True])
 def test_the_bus_never_takes_longer_than_the_closed_form(simulated: ModuleType, *, alone: bool) -> None:
-    @settings(max_examples=at_least(5))
+    @settings(max_examples=at_least(5, 40))
     @given(cases(alone=alone))
     def holds(case: Case) -> None:
         above_us = allowance_us(case, simulated)

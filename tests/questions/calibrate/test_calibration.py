@@ -61,7 +61,7 @@ def test_table_1_is_its_latency_less_its_packets(model: str) -> None:
     assert (answer.uncertainty_us, answer.outliers, answer.unchecked_bytes) == (None, (), tuple(printed))
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data())
 def test_latencies_of_a_profile_give_its_own_execution_time(
     any_profile: st.SearchStrategy[busplan.Profile], data: st.DataObject

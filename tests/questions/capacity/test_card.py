@@ -221,7 +221,7 @@ def test_can_without_messages_has_none_that_is_late() -> None:
     assert "latest message" not in lines
 
 
-@settings(max_examples=at_least(8))
+@settings(max_examples=at_least(8, 60))
 @given(name=st.sampled_from(SHIPPED), period_us=st.sampled_from([250, 1000, 2000, 4000, 64000]))
 def test_what_is_used_and_free_fills_what_the_bus_may_use(name: str, period_us: int) -> None:
     answer = busplan.capacity(name, period_us=period_us)

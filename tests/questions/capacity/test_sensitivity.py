@@ -60,7 +60,7 @@ def next_bottleneck(profile: busplan.Profile) -> Any:
     return busplan.capacity(profile, sensitivity=True).sensitivities[0].next_bottleneck
 
 
-@settings(max_examples=at_least(4))
+@settings(max_examples=at_least(4, 40))
 @given(data=st.data(), per_axis=st.sampled_from([None, 1, 8]), reserve=st.sampled_from([0.0, 0.2]))
 def test_each_row_is_the_capacity_of_the_profile_with_that_change_and_the_largest_comes_first(
     data: st.DataObject, per_axis: int | None, reserve: float, any_profile: st.SearchStrategy[busplan.Profile]
@@ -231,7 +231,7 @@ def test_a_term_goes_with_its_cause(make: Maker, changes: dict[str, Any], bindin
     assert bottleneck.next_binding_term.key != binding
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data())
 def test_without_the_limit_the_next_one_keeps_one_node_more_off(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

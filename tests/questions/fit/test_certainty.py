@@ -198,7 +198,7 @@ def _drawn_us(profile: busplan.Profile) -> NDArray[np.float64]:
     return np.asarray(required_us + halves * (HALF_U_US * normal(draws) + gap_term_us * uniform))
 
 
-@settings(max_examples=at_least(4))
+@settings(max_examples=at_least(4, 40))
 @given(data=st.data())
 def test_more_bias_or_reserve_never_improves_and_more_uncertainty_never_shows(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
@@ -220,7 +220,7 @@ def _rank(figures: Any) -> int:
     return ("fits", "not shown to fit", "does not fit").index(figures.verdict)
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data())
 def test_no_faster_node_and_no_shorter_cable_makes_a_verdict_worse(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

@@ -23,7 +23,7 @@ from tests.registers import at_least, shipped_names
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
 KINDS = pytest.mark.parametrize("kind", kind_names())
-SOME = settings(max_examples=at_least(3))  # of each kind
+SOME = settings(max_examples=at_least(3, 20))  # of each kind
 PLACES = st.lists(st.integers(2, 68), min_size=4, max_size=4).map(lambda places: {0, 1, *places})
 """Some of an array, the first two always."""
 

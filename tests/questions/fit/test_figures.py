@@ -49,7 +49,7 @@ def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
         assert [nodes for nodes in sorted(tried) if good(nodes, figures.timing_model)] == [most][:most]
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data(), nodes=st.integers(1, 62))
 def test_a_cycle_that_fits_exactly_fits(
     data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[busplan.Profile]
@@ -122,7 +122,7 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     assert (figures.verdict == "fits" and figures.safe) == (figures.nodes <= figures.safe_nodes)
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data())
 def test_the_smallest_period_fits_and_nothing_below_it(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
@@ -154,7 +154,7 @@ GROWING = {
 
 
 @pytest.mark.parametrize("key", some(GROWING, 5))
-@settings(max_examples=at_least(2))  # of each key
+@settings(max_examples=at_least(2, 12))  # of each key
 @given(data=st.data(), model=MODELS, period_us=st.floats(50, 20_000))
 def test_max_nodes_never_grows_with_what_costs_time(
     key: str, data: st.DataObject, model: str, period_us: float, make: Make
@@ -174,7 +174,7 @@ def test_a_payload_of_exactly_a_quadlet_is_cheaper_than_a_smaller_one(make: Make
     assert quadlet < small
 
 
-@settings(max_examples=at_least(6))
+@settings(max_examples=at_least(6, 40))
 @given(data=st.data(), periods=st.lists(st.floats(1, 50_000), min_size=2, max_size=2))
 def test_max_nodes_never_shrinks_with_the_period(
     data: st.DataObject, periods: list[float], any_profile: st.SearchStrategy[busplan.Profile]

@@ -120,7 +120,7 @@ def grouped(draw: st.DrawFn) -> busplan.Profile:
 # --- equal groups -----------------------------------------------------------------------------------------
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data(), parts=st.lists(st.integers(1, 20), min_size=1, max_size=4), own=st.booleans())
 def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
     data: st.DataObject, parts: list[int], own: bool, any_profile: st.SearchStrategy[busplan.Profile]
@@ -158,7 +158,7 @@ def test_equal_groups_that_are_no_neighbours_stay_apart() -> None:
 # --- unlike groups ----------------------------------------------------------------------------------------
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(profile=grouped())
 def test_events_add_up_to_the_terms(profile: busplan.Profile) -> None:
     for figures_of_model in busplan.capacity(profile).results:
@@ -185,7 +185,7 @@ def test_each_group_is_counted_as_a_brute_search_counts_it(profile: busplan.Prof
                 assert fits[key] == (nodes <= most), (group.name, key)
 
 
-@settings(max_examples=at_least(6))
+@settings(max_examples=at_least(6, 40))
 @given(profile=grouped())
 def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: busplan.Profile) -> None:
     own, farthest = (changed(profile, {"bus.charge_hops": word}) for word in ("own", "farthest"))
@@ -193,7 +193,7 @@ def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: busplan.
         assert shorter.us <= longer.us + 1e-9, shorter.key
 
 
-@settings(max_examples=at_least(4))
+@settings(max_examples=at_least(4, 40))
 @given(profile=grouped())
 def test_a_derivation_gives_the_figures(profile: busplan.Profile) -> None:
     for of_model in busplan.capacity(profile).results:
@@ -204,7 +204,7 @@ def test_a_derivation_gives_the_figures(profile: busplan.Profile) -> None:
                 assert derivation.value == values[key]
 
 
-@settings(max_examples=at_least(3))
+@settings(max_examples=at_least(3, 24))
 @given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
 def test_a_sweep_gives_what_each_profile_gives(profile: busplan.Profile, nodes: list[int]) -> None:
     name = profile.group[-1].name
@@ -326,7 +326,7 @@ def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., busplan.Prof
 # --- what to set ------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 28))
 @given(
     profile=grouped(),
     limits=st.fixed_dictionaries(

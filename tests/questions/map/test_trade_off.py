@@ -90,7 +90,7 @@ def assert_cells_are_those_of_capacity(answer: busplan.MapAnswer, *, step: int =
         assert cell.reasons == limits[cell.state]
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data())
 def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]) -> None:
     profile = data.draw(any_profile)
@@ -105,7 +105,7 @@ def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.S
     assert_cells_are_those_of_capacity(answer)
 
 
-@settings(max_examples=at_least(3))
+@settings(max_examples=at_least(3, 24))
 @given(data=st.data())
 def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

@@ -134,7 +134,7 @@ def test_a_log_that_shows_nothing_fails_the_gate(tmp_path: Path) -> None:
     assert "its stamps have steps of 1,000,000 us, and a cycle lasts 4,000" in codes["BP403"]
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(st.lists(st.floats(0, 3.4), min_size=3, max_size=40), st.sets(st.integers(5, 9), max_size=1))
 def test_pdos_that_come_in_their_order_are_those_of_their_syncs(
     tmp_path_factory: pytest.TempPathFactory, late: list[float], lost: set[int]

@@ -292,7 +292,7 @@ def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
     assert next(figure.events for figure in answer.figures if figure.quantity == "period") == 400
 
 
-@settings(max_examples=at_least(10))
+@settings(max_examples=at_least(10, 80))
 @given(
     st.sampled_from(["uniform", "normal", "exponential"]),
     st.floats(0.5, 30.0),

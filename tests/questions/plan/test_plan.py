@@ -41,7 +41,7 @@ limits: st.SearchStrategy[dict[str, object]] = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @given(data=st.data())
 def test_what_a_plan_writes_passes_the_gate(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
@@ -233,7 +233,7 @@ def test_goals_that_no_profile_can_have_are_refused(asked: dict[str, Any], words
 # --- the change that `capacity` and `check` advise -----------------------------------------------------------------
 
 
-@settings(max_examples=at_least(6))
+@settings(max_examples=at_least(6, 40))
 @given(data=st.data())
 def test_capacity_and_check_advise_what_plan_finds(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]

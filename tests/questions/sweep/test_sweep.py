@@ -86,7 +86,7 @@ def test_every_row_equals_capacity_of_its_point(
     assert_rows_are_those_of_capacity(profile, vary)
 
 
-@settings(max_examples=at_least(4))
+@settings(max_examples=at_least(4, 40))
 @given(data=st.data(), nodes=st.integers(1, 20))
 def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
     data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[busplan.Profile]

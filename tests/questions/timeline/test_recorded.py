@@ -138,7 +138,7 @@ def written(folder: Path, plan: dict[str, Any]) -> Path:
     return path
 
 
-@settings(max_examples=at_least(5))
+@settings(max_examples=at_least(5, 40))
 @example(2001, 500.0, 1.0)
 @given(SEEDS, st.sampled_from([0.0, 0.0, 50.0, 500.0]), st.sampled_from([1.0, 10.0]))
 def test_shares_of_a_cycle_of_sync_are_those_of_the_machine(
@@ -371,7 +371,7 @@ def test_an_error_frame_and_what_it_destroys_are_not_attributed(folder: Path) ->
     assert unknown.duration_us >= logged[place + 1].wire_us - 8
 
 
-@settings(max_examples=at_least(4))
+@settings(max_examples=at_least(4, 40))
 @given(SEEDS)
 def test_shares_of_an_ethercat_cycle_are_those_of_the_machine(folder: Path, seed: int) -> None:
     keys, path = fitting("ethercat", seed, folder)
