@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from difflib import get_close_matches
+from functools import cache
 from math import inf
 from operator import eq
 from typing import Any, Final, NamedTuple, get_args
@@ -235,17 +236,18 @@ def _unknown(path: KeyPath, section: type[BaseModel], model: type[BaseModel]) ->
     if kinds := kinds_with(path):
         words = listed([value_text(kind) for kind in kinds], "or")
         return f"unknown key on this bus; it is a key where bus.kind is {words}"
-    parts_of_keys = [key.split(".") for key in value_keys(model, {})]
-    elsewhere = [
-        ".".join(parts[: number + 1])
-        for parts in parts_of_keys
-        for number, part in enumerate(parts)
-        if number and (part == name or part.startswith(f"{name}_"))
-    ]
+    elsewhere = [key for key, part in _parts_of_keys(model).items() if part == name or part.startswith(f"{name}_")]
     close = get_close_matches(name, names, n=1)
     # A name at the top is more likely that of a section than a misspelt other.
     meant = [*elsewhere, *close] if len(path) == 1 else [*close, *elsewhere]
     return f"unknown key; did you mean {meant[0]}?" if meant else f"unknown key; known here: {', '.join(names)}"
+
+
+@cache
+def _parts_of_keys(model: type[BaseModel]) -> dict[str, str]:
+    """Last part of each key below a section, and of each section below another."""
+    keys = (key.split(".") for key in value_keys(model, {}))
+    return {".".join(parts[:end]): parts[end - 1] for parts in keys for end in range(2, len(parts) + 1)}
 
 
 def _kinds_beside(model: type[BaseModel], section: type[BaseModel]) -> dict[str, type[BaseModel]]:
