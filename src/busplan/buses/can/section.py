@@ -15,6 +15,7 @@ from busplan.buses.can.equations import (
 )
 from busplan.buses.can.traffic import HOST, LOOP, NAMES, NODE, NOT_BY_PRIORITY, SYNC, Access
 from busplan.elementwise import Number
+from busplan.english import plural
 from busplan.sections.base import (
     MAX_TIME_US,
     MIN_STEP_US,
@@ -60,6 +61,10 @@ _OF_ADAPTER: Final = {
 _MOST_CYCLES = 1000
 _MOST_MESSAGES = 2048
 """As many as there are identifiers of 11 bits. Each is counted beside all others."""
+_MOST_WITHOUT_SYNC = 500
+"""Most messages beside requests, each of which may wait for all of them."""
+_MOST_BESIDE_GROUPS = 8000
+"""Most messages times groups: the most nodes of each group are searched beside all messages."""
 
 
 class CanBus(BusSection):
@@ -412,10 +417,20 @@ class CanProfile(Profile):
         elif self.bus.sync_jitter_us >= self.cycle.period_us:
             why = f"is not under cycle.period_us, {self.cycle.period_us:g}: the next SYNC would come before it"
             yield Problem(why, key="bus.sync_jitter_us", kind="inconsistent")
+        if self.has_cycle:
+            yield from self._problems_of_many()
         yield from self._names_problems()
         yield from self._identifiers_problems()
         if self.bus.data_bit_rate_kbit_s is None:
             yield from self._problems_of_no_data_bit_rate()
+
+    def _problems_of_many(self) -> Iterator[Problem]:
+        """More messages than are computed beside a cycle."""
+        number, groups = len(self.message), len(self.node_groups)
+        most = min(_MOST_BESIDE_GROUPS // groups, _MOST_MESSAGES if self.bus.access == "sync" else _MOST_WITHOUT_SYNC)
+        if number > most:
+            beside = "a cycle of requests" if most == _MOST_WITHOUT_SYNC else plural(groups, "group")
+            yield Problem(f"has {number:,} entries, must have {most:,} or fewer beside {beside}", "message")
 
     def _problems_of_no_cycle(self) -> Iterator[Problem]:
         """Keys of a cycle, of a network without nodes."""

@@ -25,6 +25,8 @@ _EXTENDED: Final = 1 << 29
 _IDENTIFIER: Final = (1 << 11) - 1
 _EVERY_SYNC, _LAST_SYNC_TYPE = 1, 240
 _MOST_NODE: Final = 127
+_MOST_SECTIONS: Final = 100_000
+"""Most sections of a file, several times those of a large drive: they bound the memory."""
 _PREDEFINED_PDOS: Final = 4
 """PDOs of a direction whose identifiers are 0x180 to 0x500 plus the node-ID (CiA 301)."""
 _MOST_MAPPED: Final = 64
@@ -94,7 +96,7 @@ def read(text: str, name: str, *, nodes: tuple[int, ...] = ()) -> Reading:
     BusplanError, with its line: a number is invalid, the device has no PDOs, or a DCF, which has a node-ID of its own,
     is to describe other nodes.
     """
-    sections = _sections(text)
+    sections = _sections(text, name)
     setup = sections.get("devicecomissioning") or sections.get("devicecommissioning") or {}
     is_set = "nodeid" in setup
     machine = Reading("can", "DCF" if is_set else "EDS", name, rank=0, lists_all=False)
@@ -287,13 +289,18 @@ class _Device:
         return ceil(bits / 8)
 
 
-def _sections(text: str) -> dict[str, _Section]:
-    """Keys and values of each section, with their lines; case does not count in names."""
+def _sections(text: str, name: str) -> dict[str, _Section]:
+    """Keys and values of each section, with their lines; case does not count in names.
+
+    BusplanError, with its line: more sections than a device has.
+    """
     sections: dict[str, _Section] = {}
     section: _Section = {}
     for line, content in enumerate(text.split("\n"), start=1):
         if match := _SECTION.match(content):
             section = sections.setdefault(match[1].strip().lower(), {})
+            if len(sections) > _MOST_SECTIONS:
+                raise BusplanError(f"{name}:{line}: more than {_MOST_SECTIONS:,} sections; no such file is a device's")
         elif match := _VALUE.match(content):
             section.setdefault(match[1].lower(), (match[2], line))
     return sections
