@@ -1,5 +1,6 @@
 """What tests of several rooms share: a real git repository; the program as a process, and called in this one."""
 
+import gc
 import os
 import pty
 import subprocess
@@ -45,6 +46,13 @@ settings.load_profile("quick")
 def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
     """Tests have no doctests: nothing is searched for them, and no helper is loaded, in every worker."""
     return [found for found in (yield) if type(found) is pytest.Module]
+
+
+def pytest_collection_finish() -> None:
+    """What is there for all tests is no garbage, and is looked through no more."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 def run_git(*arguments: str, cwd: Path) -> bytes:

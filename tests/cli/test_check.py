@@ -428,6 +428,7 @@ def put_program(program: Path, folder: Path) -> None:
     (folder / "busplan").symlink_to(program)
 
 
+@pytest.mark.slow
 def test_the_pre_commit_hook_checks_profiles_wherever_they_are_and_nothing_else(
     run: Busplan, program: Path, folder: Path
 ) -> None:

@@ -54,6 +54,7 @@ def test_the_first_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) 
     }
 
 
+@pytest.mark.slow
 def test_circle_tests_add_their_columns_and_processes_change_nothing(run: Run, tmp_path: Path) -> None:
     circle = ("--set", "circle.radius_mm=20", "--set", "circle.feed_mm_per_min=15000", "--format", "json")
     grid = ("sweep", "paper-4ms", "--vary", "cycle.period_us=500,4000", "--circle", *circle)

@@ -17,6 +17,7 @@ def parquet(path: Path) -> Any:
     return needed("pyarrow.parquet").ParquetFile(path)
 
 
+@pytest.mark.slow
 def test_the_ending_chooses_parquet_and_a_pipe_gets_the_same_bytes(run: Run, tmp_path: Path) -> None:
     needed("pyarrow")
     grid = ("sweep", "paper-4ms", "--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3")

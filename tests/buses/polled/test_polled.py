@@ -481,6 +481,7 @@ WRITE_REQUEST_BYTES = { value = 6 }
 """
 
 
+@pytest.mark.slow
 def test_a_table_is_a_protocol(tmp_path: Path) -> None:
     shutil.copytree(
         Path(busplan.__file__).parent, tmp_path / "busplan", ignore=shutil.ignore_patterns("*.pyc.*", "*.html")

@@ -162,6 +162,7 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
     assert HOSTILE not in page
 
 
+@pytest.mark.slow
 def test_a_drawing_of_a_thousand_nodes_can_be_read() -> None:
     many = busplan.timeline(
         busplan.load_profile("ethercat-servo-8", changes={"bus.nodes": 1000, "cycle.period_us": 1e6})
