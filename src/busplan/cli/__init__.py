@@ -3,10 +3,12 @@
 import os
 import sys
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
+from typer.main import get_command
 
 from busplan import __version__
 from busplan.cli.lazy import SETTINGS, LazyGroup
@@ -53,13 +55,17 @@ def _options(
         os.environ[PAGER] = ""
 
 
+_command: Final = cache(get_command)
+"""Command of a typer app, made once: a process may run several command lines."""
+
+
 def run() -> None:
     """Run the command line and exit with one of the codes in its epilog."""
     mend_streams()
     try:
         _require_memory()
         with signals_end_the_run():
-            sys.exit(app(prog_name="busplan"))
+            sys.exit(_command(app)(prog_name="busplan"))
     except SystemExit as leaving:
         # Typer exits with 2 for usage, 130 for Ctrl-C, and 1 for a closed pipe or other errors, which is no verdict.
         sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)
