@@ -109,3 +109,31 @@ def test_what_takes_too_long_of_many_groups_is_refused_and_the_report_says_so(tm
         busplan.explore(path, x=few, y={"cycle.period_us": range(1000, 21_000, 1000)}, over={"bus.gap_count": [63]})
     (page,) = busplan.report(path).to_dict()["profiles"]
     assert page["missing"] == ["What moves the margin is not shown: it is for up to 50 groups."]
+
+
+@pytest.mark.parametrize(
+    ("changes", "most", "beside"),
+    [
+        ({"access": "polled"}, 500, "a cycle of requests"),
+        ({"access": "burst"}, 500, "a cycle of requests"),
+        ({}, 200, "40 groups"),
+    ],
+)
+def test_what_a_can_cycle_has_beside_it_is_bounded(
+    tmp_path: Path, changes: dict[str, Any], most: int, beside: str
+) -> None:
+    data = with_groups(1 if changes else 40, "can")
+    data["bus"] |= {"bit_rate_kbit_s": 1000, **changes}
+    for number, group in enumerate(data["group"]):
+        group |= {"feedback_identifier": 0x300 + number, "command_identifier": 0x200 + number}
+    message = {"payload_bytes": 8, "period_us": 1e6, "identifier_bits": 29}
+    data["message"] = [{**message, "name": f"m{place}", "identifier": 0x10000 + place} for place in range(most + 1)]
+    path = tmp_path / "p.toml"
+    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    with pytest.raises(busplan.BusplanError) as refused:
+        busplan.load_profile(path)
+    (problem,) = refused.value.problems
+    assert problem.endswith(f"message: has {most + 1} entries, must have {most} or fewer beside {beside}")
+    del data["message"][-1]
+    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    assert busplan.load_profile(path)

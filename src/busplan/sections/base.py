@@ -1,6 +1,7 @@
 """Base of all sections of a profile: strictness, ranges, and error messages of our own."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Annotated, Any, Final, Literal, NamedTuple, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -69,11 +70,16 @@ class Section(BaseModel):
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
-        # A class may rely on the checks of the classes that it extends.
-        for section in reversed(type(self).__mro__):
-            if "_problems" in vars(section) and (problems := tuple(vars(section)["_problems"](self))):
+        for check in _checks(type(self)):
+            if problems := tuple(check(self)):
                 raise refused(*problems)
         return self
+
+
+@cache
+def _checks(section: type[Section]) -> tuple[Callable[[Section], Iterator[Problem]], ...]:
+    """The checks of a class, behind those of the classes that it extends, on which they may rely."""
+    return tuple(vars(each)["_problems"] for each in reversed(section.__mro__) if "_problems" in vars(each))
 
 
 _Section = TypeVar("_Section", bound=Section)

@@ -31,6 +31,10 @@ REFUSED = {
     "entities from outside": (OUTSIDE, r":1: a document type"),
     "entities of a database": (f"{OUTSIDE.splitlines()[0]}<NetworkDefinition/>", r":1: a document type"),
     "deep": ("<masters>" + "<a>" * 100_000, r":1: elements inside each other more than 64 deep"),
+    "objects": (
+        "[DeviceInfo]\n" + "".join(f"[{number:x}]\n" for number in range(100_000)),
+        r":100001: more than 100,000 sections; no such file is a device's",
+    ),
     "empty": ("", ": is empty"),
     "blank": ("\ufeff \n\t\n", ": is empty"),
     "none": ("a,b\n1,2\n", r": no format that busplan imports: ENI \(a root <EtherCATConfig>\); LinuxCNC's"),
