@@ -8,9 +8,12 @@ from random import Random
 from typing import Any
 
 import can
+import numpy as np
 import pytest
 
 import busplan
+from busplan.buses.rule import RecordedFigure, Sense
+from busplan.recordings.statistics import Events
 from tests.oracles import can_recording as log
 from tests.oracles import ethercat_recording as capture
 from tests.oracles import moments
@@ -149,3 +152,24 @@ def test_packets_of_others_are_counted_as_wireshark_does(form: Callable[..., byt
     assert (lost.first_frame, lost.worst_frame) == (number, number)
     # From the first packet, which is another's.
     assert lost.first_s == pytest.approx(sent_us[0] / 1e6, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "values", "sense", "first", "worst"),
+    [
+        (5.0, [104, 107, 120, 109], "at most", 3, 3),  # outside is what is over 100 + 1.645 U
+        (5.0, [96, 93, 80, 91], "at least", 3, 3),
+        (5.0, [104, 95, 80, 91], "equal", 3, 3),
+        (4.0, [101, 107, 120, 109], "at most", 2, 3),
+        (20.0, [99, 101, 107, 120], "at most", 2, 4),  # not shown is what is over the plan
+        (0.0, [99, 90, 100, 100], "at most", None, 3),
+    ],
+)
+def test_the_first_event_is_the_first_with_the_verdict_of_its_figure(
+    uncertainty: float, values: list[float], sense: Sense, first: int | None, worst: int
+) -> None:
+    recorded = float(min(values) if sense == "at least" or min(values) == 80 else max(values))
+    events = Events(np.array(values, float), np.arange(4.0), np.arange(1, 5))
+    found = RecordedFigure("cycle", "us", 100.0, recorded, uncertainty, sense, 4).located(events)
+    assert (found.first_frame, found.worst_frame) == (first, worst)
+    assert found.first_s == (None if first is None else first - 1.0)
