@@ -206,6 +206,7 @@ class Loading:
         if name == {name!r}:
             os.kill(os.getpid(), signal.SIGINT)
 sys.meta_path.insert(0, Loading)
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a script's background jobs ignore it
 sys.argv = ["busplan", "capacity", "paper-4ms"]
 from busplan.__main__ import main
 main()
