@@ -74,7 +74,9 @@ class CanCycle(BusCycle):
     @classmethod
     def made(cls, network: Network, model: str, traffic: Traffic) -> Self:
         """The cycle of a network's traffic under a timing model, which the traffic keeps: each limit asks for it."""
-        cycle: Self = traffic.results.setdefault((cls, model), cls(network, model, traffic=traffic))
+        if (cls, model) not in traffic.results:
+            traffic.results[cls, model] = cls(network, model, traffic=traffic)
+        cycle: Self = traffic.results[cls, model]
         return cycle
 
     def of(self, traffic: Traffic) -> Self:

@@ -28,6 +28,7 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.network import Group, Network, Rate, numbers_by_due
 from busplan.elementwise import (
     Number,
+    are_plain,
     choose,
     is_everywhere,
     is_off,
@@ -323,7 +324,7 @@ def devices(network: Network) -> tuple[Devices, ...]:
     if not has_rates(network):
         return whole
     numbers = _cycle_inputs(network, whole)
-    if all(isinstance(number, int | float) for number in numbers):
+    if are_plain(*numbers):
         is_there = _cycles(network, numbers)[0].due
         return tuple(
             entry if is_due else entry._replace(data_bytes=0) for entry, is_due in zip(whole, is_there, strict=True)
