@@ -137,8 +137,6 @@ class Network(NamedTuple):
     period_us: Number
     slice_ratio: Number
     nonperiodic_us: Number
-    varied: str | None = None
-    """Name of the profile's group that `with_nodes` changes; None where groups differ and none has been chosen."""
 
     @property
     def nodes(self) -> Number:
@@ -166,22 +164,22 @@ class Network(NamedTuple):
         """Whether the profile has no groups: all nodes are those of [node]."""
         return self.names == ("",)
 
-    @property
-    def varied_group(self) -> ProfileGroup:
-        """Group of the profile that `with_nodes` changes."""
+    def group_named(self, name: str) -> ProfileGroup:
+        """A group of the profile, with its own number of nodes; an empty name for the nodes of [node]."""
         groups: tuple[ProfileGroup, ...] = self.profile.node_groups
-        return next(group for group in groups if group.name == self.varied)
+        return next(group for group in groups if group.name == name)
 
-    def varying(self, name: str) -> "Network":
-        """The same network, with group `name` as the one that `with_nodes` changes; empty for the nodes of [node]."""
-        return self._replace(varied=name)
+    def with_nodes(self, nodes: Number, *, group: str = "") -> "Network":
+        """The network with another number of nodes in a group of the profile; this object with its own number [1]."""
+        own = self.group_named(group).nodes
+        if isinstance(own, int) and isinstance(nodes, int) and nodes == own:
+            return self
+        return self._replace(groups=tuple(_with_nodes(run, group, nodes) for run in self.groups))
 
-    def with_nodes(self, nodes: Number) -> "Network":
-        """The same network with another number of nodes in its varied group [1]."""
-        return self._replace(groups=tuple(self._with_nodes(group, nodes) for group in self.groups))
 
-    def _with_nodes(self, group: Group, nodes: Number) -> Group:
-        others = [member.nodes for member in group.members if member.name != self.varied]
-        if len(others) == len(group.members):
-            return group
-        return group._replace(nodes=total((nodes, *others)) if others else nodes)
+def _with_nodes(run: Group, name: str, nodes: Number) -> Group:
+    """A run of groups with another number of nodes in the one of a name, if it has that."""
+    others = [member.nodes for member in run.members if member.name != name]
+    if len(others) == len(run.members):
+        return run
+    return run._replace(nodes=total((nodes, *others)) if others else nodes)

@@ -278,18 +278,20 @@ _OF_PDOS: Final = ("identifier", "number", "payload_bytes", "every")
 
 
 _LAST: Final[list[tuple[Network, Traffic]]] = []
-"""The last network and its traffic."""
+"""The last networks and their traffic, the latest at the end."""
+_REMEMBERED: Final = 4
 
 
 def traffic_of(network: Network) -> Traffic:
     """Traffic of a network, with the stuff bits of the worst case.
 
-    The last one is remembered, for each limit of a network asks again. A network may hold arrays, so it is no key of a
-    table and is told apart by identity.
+    The last ones are remembered, for each limit of a network asks again. A network may hold arrays, so it is no key of
+    a table and is told apart by identity.
     """
-    if not _LAST or _LAST[0][0] is not network:
-        _LAST[:] = [(network, _traffic_of(network))]
-    return _LAST[0][1]
+    found = next((pair for pair in reversed(_LAST) if pair[0] is network), None) or (network, _traffic_of(network))
+    if not _LAST or _LAST[-1] is not found:
+        _LAST[:] = [*(pair for pair in _LAST if pair is not found), found][-_REMEMBERED:]
+    return found[1]
 
 
 def _traffic_of(network: Network) -> Traffic:

@@ -60,7 +60,7 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
             'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
             'calibrate with cycle.schedule = "individual"'
         )
-    nodes = next(nodes for nodes in network.profile.node_groups if nodes.name == group)
+    nodes = network.group_named(group)
     answer, key = getattr(nodes.node, f"{kind}_response"), nodes.node_key(f"{kind}_response")
     if answer != "split":
         raise BusplanError(

@@ -140,7 +140,7 @@ def _slower(network: Network) -> Perturbed:
 
 def _one_node_more(network: Network, group: ProfileGroup) -> Perturbed:
     more = group.nodes + 1
-    grown = network.varying(group.name).with_nodes(more)
+    grown = network.with_nodes(more, group=group.name)
     return Perturbed(f"one more node{_in(group)}", group.nodes_key, group.nodes, more, grown, "")
 
 

@@ -248,7 +248,9 @@ def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """Nodes of each group that fit a network's period, and are shown to fit; of all where they are alike."""
     groups = network.profile.node_groups
     if len(groups) < _MANY_GROUPS or not has_arrays(network):
-        found = (most_and_safe_nodes(network.varying(group.name).with_nodes, network, model=model) for group in groups)
+        found = (
+            most_and_safe_nodes(partial(network.with_nodes, group=group.name), network, model=model) for group in groups
+        )
         words = [(most.words, safe and safe.words) for most, safe in found]
     else:
         words = _words_of_each(network, model=model)

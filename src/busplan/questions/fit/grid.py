@@ -1,6 +1,7 @@
 """A grid: values of some keys, the networks at its points, and their figures, in arrays where a kind has them."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
@@ -181,11 +182,10 @@ def _counts(points: Sequence[GridPoint], group: ProfileGroup, *, model: str) -> 
     names: list[_Changes] = [*different]
     counts: dict[_Changes, Counts] = {}
     for places, network in _in_arrays([*different.values()], without=group.nodes_key):
-        varying = network.varying(group.name)
-        found = most_and_safe_nodes(varying.with_nodes, varying, model=model)
+        found = most_and_safe_nodes(partial(network.with_nodes, group=group.name), network, model=model)
         counts |= zip((names[place] for place in places), counts_at(found, len(places)), strict=True)
     return [
-        GroupCapacity.of(point.network.varying(group.name).varied_group, *counts[key])
+        GroupCapacity.of(point.network.group_named(group.name), *counts[key])
         for point, key in zip(points, keys, strict=True)
     ]
 

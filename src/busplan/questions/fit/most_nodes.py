@@ -1,6 +1,7 @@
 """The largest number of nodes that a bus carries."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import count
 from math import inf
 from typing import Final, NamedTuple
@@ -41,7 +42,7 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
     is a limit that is left out, to find what binds next.
     """
     limits = [limit for limit in limits_to_be_safe(network) if limit.key != without]
-    return most_nodes(network.varying(group).with_nodes, limits).words
+    return most_nodes(partial(network.with_nodes, group=group), limits).words
 
 
 def most_and_safe_nodes(

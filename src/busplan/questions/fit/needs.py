@@ -63,7 +63,7 @@ def rooms(network: Network) -> Iterator[Room]:
             if spare is not None:
                 nodes = int(group.nodes) + spare
                 of = f" of {group.name}" if group.name else ""
-                yield Room(key, network.varying(group.name).with_nodes(nodes), group.name, f"{nodes} nodes{of}")
+                yield Room(key, network.with_nodes(nodes, group=group.name), group.name, f"{nodes} nodes{of}")
 
 
 def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:

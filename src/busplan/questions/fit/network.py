@@ -30,8 +30,7 @@ def network_of(profile: Profile) -> Network:
         raise RuntimeError(f"{profile.name}: computed with other constants than its own; see busplan.sourced")
     cycle = profile.cycle
     groups = tuple(_group(members) for members in _runs_of_alike(profile.node_groups))
-    varied = None if profile.group else ""
-    return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, varied)
+    return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us)
 
 
 def _group(members: Sequence[ProfileGroup]) -> Group:

@@ -378,7 +378,7 @@ def _periods_of_nodes(network: Network, group: str) -> list[float]:
     bus = network.bus
     most, _ = safe_nodes(at_period(network, min(MAX_TIME_US, bus.periods.longest_us)), group=group)
     counts = np.arange(1, most + 1)
-    cycle = bus.cycle(network.varying(group).with_nodes(counts), model=bus.deciding_model)
+    cycle = bus.cycle(network.with_nodes(counts, group=group), model=bus.deciding_model)
     needed_us = np.asarray(certainty(cycle).safe_required_us)
     periods_us = shortest_period_us(cycle.network, needed_us, is_shown=True)
     return [float(us) for us in np.broadcast_to(np.asarray(periods_us), counts.shape)]

@@ -6,7 +6,7 @@ added here.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from math import prod
 from typing import Final, NamedTuple
 
@@ -212,11 +212,11 @@ def _counts(network: Network, *, model: str, group: str) -> dict[str, Array]:
             "limited_by": _objects([None]),
             "safe_limited_by": _objects([None]),
         }
-    counts = {name: _counts_of(network.varying(name), model=model) for name in network.names}
+    counts = {name: _counts_of(network, name, model=model) for name in network.names}
     whole = counts[group]
     if network.is_uniform:
         return whole
-    varied = network.varying(group).varied_group
+    varied = network.group_named(group)
     beside = {"nodes": network.nodes - varied.nodes, "axes": network.axes - varied.nodes * varied.node.axes}
     # Where not even one of its nodes fits, there is no number of the whole.
     more = {
@@ -230,9 +230,9 @@ def _counts(network: Network, *, model: str, group: str) -> dict[str, Array]:
     return {**whole, **{key: column.astype(whole[key].dtype) for key, column in more.items()}, **of_groups}
 
 
-def _counts_of(network: Network, *, model: str) -> dict[str, Array]:
-    most, safe = most_and_safe_nodes(network.with_nodes, network, model=model)
-    axes = network.varied_group.node.axes
+def _counts_of(network: Network, group: str, *, model: str) -> dict[str, Array]:
+    most, safe = most_and_safe_nodes(partial(network.with_nodes, group=group), network, model=model)
+    axes = network.group_named(group).node.axes
     return {
         "max_nodes": _number(most.nodes, "count"),
         "max_axes": _number(axes * most.nodes, "count"),
