@@ -278,9 +278,11 @@ def unit_cycles(
     cycles = []
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
         present = [unit.present(is_due=True) for unit, is_due in zip(units, due, strict=True) if is_due]
-        packed = pack(present, datagrams=datagrams, first_bytes=first_bytes)
+        runs = list(frames_of(present, datagrams=datagrams, first_bytes=first_bytes))
+        wire_bytes = total(run.frames * frame_bytes(run.datagrams_bytes) for run in runs)
+        last_bytes = runs[-1].datagrams_bytes if runs else 0.0
         data_bytes = sum(group.number * group.data_bytes for group in present)
-        cycles.append(UnitCycle(due, numbers, packed.wire_bytes, packed.last_bytes, data_bytes))
+        cycles.append(UnitCycle(due, numbers, wire_bytes, last_bytes, data_bytes))
     return tuple(sorted(cycles, key=lambda cycle: (-cycle.wire_bytes, -cycle.data_bytes)))
 
 

@@ -325,13 +325,18 @@ def _rounded_up(us: float, cycle: CycleFigures, bus: Bus) -> str:
     return period(us)
 
 
+_MOST_ROOMS: Final = 5
+"""Groups with room that are named."""
+
+
 def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
     """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
     cycle = verdict.cycle
     if verdict.all_well and cycle:
         spare = [(count, (count.safe_nodes or 0) - count.nodes) for count in cycle.counts]
         if rooms := [_more(count, number) for count, number in spare if number > 0]:
-            yield "room for", blocks.Sentence((listed(rooms, "or"),))
+            others = [f"more nodes of {len(rooms) - _MOST_ROOMS} other groups"] if len(rooms) > _MOST_ROOMS + 1 else []
+            yield "room for", blocks.Sentence((listed([*(rooms[:_MOST_ROOMS] if others else rooms), *others], "or"),))
             return
         yield "room for", blocks.Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
