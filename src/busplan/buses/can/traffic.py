@@ -295,7 +295,7 @@ def traffic_of(network: Network) -> Traffic:
 
 
 def _traffic_of(network: Network) -> Traffic:
-    bus, groups = network.profile.bus, network.groups
+    bus, groups, nodes = network.profile.bus, network.groups, network.nodes
     alone = Traffic(
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
         data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
@@ -304,7 +304,7 @@ def _traffic_of(network: Network) -> Traffic:
         clock_tolerance=_unless(bus.clock_tolerance, 0),
         error_period_us=MAX_TIME_US if bus.error_period_us is None else bus.error_period_us,
         error_burst=0 if bus.error_period_us is None else 1 if bus.error_burst is None else bus.error_burst,
-        messages=tuple(_message(message, bus, network.nodes) for message in network.profile.message),
+        messages=tuple(_message(message, bus, nodes) for message in network.profile.message),
     )
     alone = replace(alone, queues=frozenset(_queues(network)))
     if not groups:

@@ -161,4 +161,5 @@ def capacity(
         return CapacityAnswer(network.profile, periods, verdicts)
     from busplan.questions.capacity.sensitivity import sensitivity_of
 
-    return CapacityAnswer(network.profile, periods, verdicts, tuple(map(sensitivity_of, networks)))
+    sensitivities = tuple(sensitivity_of(at, of.deciding) for at, of in zip(networks, verdicts, strict=True))
+    return CapacityAnswer(network.profile, periods, verdicts, sensitivities)

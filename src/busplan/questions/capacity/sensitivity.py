@@ -11,7 +11,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import Perturbation
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import FITS, TIME, certainty
-from busplan.questions.fit.figures import CycleFigures, cycle_figures
+from busplan.questions.fit.figures import CapacityFigures, CycleFigures, GroupCapacity, cycle_figures
 from busplan.questions.fit.most_nodes import safe_nodes
 from busplan.questions.fit.network import at_once, changed, trial, with_payloads
 from busplan.sections.base import TRANSACTION_KINDS, value_at
@@ -46,8 +46,8 @@ class NextBottleneck(NamedTuple):
     """Corrected margin without the largest term; None if nothing takes it out."""
 
 
-def next_bottleneck(network: Network) -> NextBottleneck:
-    """The largest term of a network once its first bottleneck is gone.
+def next_bottleneck(network: Network, counts: Iterable[GroupCapacity]) -> NextBottleneck:
+    """The largest term of a network once its first bottleneck is gone; `counts` are its most nodes.
 
     A term is taken out at its cause, and the cycle is computed anew: without execution, for example, the bus is idle
     for longer.
@@ -64,16 +64,20 @@ def next_bottleneck(network: Network) -> NextBottleneck:
     without = next(
         (cycle for cycle in cycles if not any(term.us for term in cycle.terms if term.key == binding.key)), None
     )
-    limits = []
-    for group in network.names:
-        nodes, limit = safe_nodes(network, group=group)
-        limits.append(NextLimit(group, nodes, limit, *safe_nodes(network, group=group, without=limit)))
     return NextBottleneck(
-        limits=tuple(limits),
+        limits=tuple(
+            NextLimit(group, nodes, limit, *safe_nodes(network, group=group, without=limit))
+            for group, nodes, limit in map(_shown, counts)
+        ),
         binding_term=binding,
         next_binding_term=_largest(without or cycle, but=binding.key),
         next_margin_corrected_us=None if without is None else certainty(without).margin_corrected_us,
     )
+
+
+def _shown(count: GroupCapacity) -> tuple[str, int, str]:
+    """Name of a group, its most nodes that are shown to fit, and the key of the limit, by the model that decides."""
+    return count.name, count.safe_nodes or 0, str(count.safe_limited_by)
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
@@ -232,13 +236,12 @@ _FARTHEST: Final = 1e6
 """Largest factor of execution times that is tried."""
 
 
-def reaches(network: Network) -> Iterator[Reach]:
+def reaches(network: Network, counts: Iterable[GroupCapacity]) -> Iterator[Reach]:
     """Room of a network that is shown to fit: for execution times, nodes and each number of the bus, one at a time."""
     bus = network.bus
     if any(group.read_execution_us or group.write_execution_us for group in network.groups):
         yield _reach("execution times, factor", "execution", 1.0, partial(slower, network))
-    for group in network.profile.node_groups:
-        nodes, limit = safe_nodes(network, group=group.name)
+    for group, (_, nodes, limit) in zip(network.profile.node_groups, map(_shown, counts), strict=True):
         yield Reach(f"nodes{_in(group)}", group.nodes_key, int(group.nodes), nodes, (limit,))
     for change in bus.perturbations(network):
         ((key, after), *more) = change.changes.items()
@@ -301,19 +304,18 @@ MOST_GROUPS: Final = 50
 """Most groups that are changed, each by itself."""
 
 
-def sensitivity_of(network: Network) -> Sensitivity:
-    """Every small change of a network, with its cycle computed anew.
+def sensitivity_of(network: Network, now: CapacityFigures) -> Sensitivity:
+    """Every small change of a network, with its cycle computed anew; `now` has the figures of the model that decides.
 
     BusplanError: the network has too many groups.
     """
     if (groups := len(network.profile.node_groups)) > MOST_GROUPS:
         raise BusplanError(f"{groups:,} groups: sensitivity changes each by itself, of up to {MOST_GROUPS}")
-    now = cycle_figures(network, model=network.bus.deciding_model)
     effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     is_well = now.verdict == FITS and now.safe
-    far = tuple(reaches(network)) if is_well else ()
-    return Sensitivity(now, tuple(effects), next_bottleneck(network), far)
+    far = tuple(reaches(network, now.counts)) if is_well else ()
+    return Sensitivity(now, tuple(effects), next_bottleneck(network, now.counts), far)
 
 
 def _effect(cause: Perturbed, now: CycleFigures, network: Network) -> Effect:
