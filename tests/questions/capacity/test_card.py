@@ -150,6 +150,25 @@ def test_the_period_and_the_nodes_that_it_names_fit_and_the_next_do_not(
         assert verdict(at_fastest, bus__nodes=nodes + 1) != "fits"
 
 
+@pytest.mark.parametrize("groups", [1, 3, 6, 7, 60])
+def test_a_few_groups_with_room_are_named_and_the_others_counted(groups: int) -> None:
+    start = "schema_version = 1\nname = 'e'\nbus.kind = 'ethercat'\ncycle = {period_us = 20000, slice_ratio = 1}\n"
+    execution = "execution = {kind = 'linear', grade = 'assumed', base_us = 20, per_byte_us = 0}\n"
+    sizes = [
+        f"[[group]]\nname = 'g{number}'\nnodes = 1\naxes = 1\nread_bytes = {number + 1}\n" for number in range(groups)
+    ]
+    text = start + "".join(f"{size}write_bytes = 4\n{execution}" for size in sizes)
+    answer = busplan.capacity(validate(decode(text.encode(), name="machine.toml")))
+    counts = [(count.safe_nodes or 0) - count.nodes for count in answer.verdicts[0].deciding.counts]
+    assert min(counts) > 0
+    words = card_of(answer)[1]["room for"]
+    named = re.findall(r"([0-9,]+) more nodes of g(\d+)", words)
+    assert [(int(more.replace(",", "")), int(place)) for more, place in named] == [
+        (counts[place], place) for place in range(groups if groups < 7 else 5)
+    ]
+    assert words.endswith(f" or more nodes of {groups - 5} other groups") == (groups > 6)
+
+
 def test_a_deadline_asks_for_a_slower_cycle_than_time_does() -> None:
     # 1.115 ms have room for the cycle; m2 has to be there within 1000 us, which PDOs every 1.386 ms leave it.
     measured = {"node.execution.grade": "measured"}
