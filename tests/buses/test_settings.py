@@ -13,6 +13,7 @@ VARIANTS = (
     ("can-fd-arm-7", {"bus.data_bit_rate_kbit_s": 500, "bus.bit_rate_kbit_s": 250}),
     ("canopen-6", {"bus.bit_rate_kbit_s": 500, "bus.sync_counter": True, "bus.identifier_bits": 29}),
     ("can-motors-8", {"bus.bit_rate_kbit_s": 500, "bus.access": "burst"}),
+    ("ethercat-servo-8", {"bus.distributed_clocks": False}),
     ("dynamixel-arm-14", {"bus.return_delay_us": 250}),
     ("dynamixel-arm-14", {"bus.requests": "single", "bus.timeout_us": 5000}),
     ("paper-1ms", {"node.write_response": "unified", "bus.max_hops": 1}),
@@ -80,3 +81,20 @@ def test_payloads_are_whole_bytes_words_of_sercos_or_quadlets_of_ieee_1394(profi
     network = network_of(profile)
     quadlets, words = {"ieee1394": 4}, {"sercos2": 2, "sercos3": 2}
     assert network.bus.payloads(network).step_bytes == (quadlets | words).get(profile.bus.kind, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "most_bytes"),
+    [
+        ("paper-4ms", {}, 2048),  # asynchronous packets of S400 and S100
+        ("paper-4ms", {"bus.speed": "S100"}, 512),
+        ("can-servo-8", {}, 4 * 8),  # four PDOs
+        ("can-fd-arm-7", {}, 4 * 64),
+        ("sercos2-servo-8", {}, 32),  # what a drive of the ring can be told to send
+        ("sercos2-servo-8", {"node.axes": 3}, 3 * 32),
+        ("profibus-drives-6", {}, 244),  # data of an SRD telegram
+    ],
+)
+def test_the_largest_payload_is_that_of_its_carrier(name: str, changes: dict[str, object], most_bytes: int) -> None:
+    network = network_of(busplan.load_profile(name, changes=changes))
+    assert network.bus.payloads(network).most_bytes == most_bytes

@@ -84,6 +84,12 @@ def test_what_a_slice_must_give_is_what_the_second_implementation_says(
     assert of(profile).safe_required_us == pytest.approx(float(exact_safe_required_us(profile, nodes)), rel=1e-12)
 
 
+@pytest.mark.parametrize("name", ["can-servo-8", "sercos2-servo-8", "sercos3-servo-8", "profibus-drives-6"])
+def test_where_no_bias_is_known_none_is_taken_off(name: str) -> None:
+    figures = busplan.capacity(name).verdicts[0].deciding
+    assert (figures.bias_us, figures.margin_corrected_us) == (None, figures.margin_us)
+
+
 def test_two_nodes_of_the_paper_by_hand(make: Maker) -> None:
     profile = with_fixed_execution(make(cycle__period_us=1000.0, bus__cycle_master=False), 36.433)
     # models.md, section 3: T_sub 10.549, T_reset 21.047, required 262.12 us; the paper has 205.92.
