@@ -13,7 +13,6 @@ VARIANTS = (
     ("can-fd-arm-7", {"bus.data_bit_rate_kbit_s": 500, "bus.bit_rate_kbit_s": 250}),
     ("canopen-6", {"bus.bit_rate_kbit_s": 500, "bus.sync_counter": True, "bus.identifier_bits": 29}),
     ("can-motors-8", {"bus.bit_rate_kbit_s": 500, "bus.access": "burst"}),
-    ("ethercat-servo-8", {"bus.distributed_clocks": False}),
     ("dynamixel-arm-14", {"bus.return_delay_us": 250}),
     ("dynamixel-arm-14", {"bus.requests": "single", "bus.timeout_us": 5000}),
     ("paper-1ms", {"node.write_response": "unified", "bus.max_hops": 1}),
