@@ -111,7 +111,8 @@ def _require_few_cells(sweep: Sweep) -> None:
     most = MOST_CELLS // (columns * len(sweep.timing_models))
     if sweep.grid.points > most:
         raise ArgumentError(
-            f"vary: {sweep.grid.points:,} points of {columns:,} columns are too many for a sweep; vary less: {most:,} points"
+            f"vary: {sweep.grid.points:,} points of {columns:,} columns are too many for a sweep; vary "
+            f"less: {most:,} points"
         )
 
 
