@@ -13,6 +13,8 @@ TIMES: Final = 5
 LEAST_SHARE: Final = 0.5
 """Least share of its planned time that the host takes."""
 MOST_FRAMES: Final = 500_000
+MOST_BYTES: Final = 120_000_000
+"""Most bytes of all frames: they are in memory several times."""
 _FIRST: Final = 3
 """Cycles before the first fault, since a fault there may pass for the machine's start."""
 _ONE_OF: Final = 4
@@ -65,10 +67,12 @@ class Emulation:
         self._hit |= drawn
         return drawn
 
-    def require_few(self, frames: float) -> None:
-        """Refuse a recording of more than `MOST_FRAMES` with a `BusplanError`."""
+    def require_few(self, frames: float, *, frames_bytes: float = 0) -> None:
+        """Refuse a recording of more than `MOST_FRAMES`, or of more than `MOST_BYTES`, with a `BusplanError`."""
         if frames > MOST_FRAMES:
             raise BusplanError(f"{frames:,.0f} frames; a recording has up to {MOST_FRAMES:,}: give fewer cycles")
+        if frames_bytes > MOST_BYTES:
+            raise BusplanError(f"{frames_bytes:,.0f} bytes; a recording has up to {MOST_BYTES:,}: give fewer cycles")
 
 
 class Emulator(NamedTuple):

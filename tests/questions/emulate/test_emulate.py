@@ -600,6 +600,10 @@ def test_the_help_names_all_faults() -> None:
         (("can-servo-8", "--seed", "0"), "seed 0: expected a whole number from 1"),
         (("can-servo-8", "--cycles", "1000000"), "a recording has up to 500,000: give fewer cycles"),
         (("ethercat-servo-8", "--duration", "1000s"), "a recording has up to 500,000: give fewer cycles"),
+        (
+            ("ethercat-servo-8", "--set", "payload.read_bytes=150", "--cycles", "50000"),
+            "bytes; a recording has up to 120,000,000: give fewer cycles",
+        ),
     ],
 )
 def test_what_cannot_be_emulated_is_refused_and_nothing_is_written(

@@ -3,6 +3,7 @@
 import re
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -227,3 +228,21 @@ def test_what_makes_no_sweep_is_refused() -> None:
     for vary, options, message in cases:
         with pytest.raises(busplan.BusplanError, match=re.escape(message)):
             busplan.sweep("paper-4ms", vary=vary, **options)
+
+
+@pytest.mark.parametrize(
+    ("groups", "points", "message"),
+    [
+        (129, 2, "many: 129 groups are more than the 128 a sweep takes"),
+        (128, 400_000, "vary: 400,000 points of 812 columns are too many for a sweep; vary less: 123,152 points"),
+    ],
+)
+def test_many_groups_allow_fewer_points(groups: int, points: int, message: str, tmp_path: Path) -> None:
+    """Each group has columns of its own, so a million points of many groups would fill the memory."""
+    lines = ["schema_version = 1", 'name = "many"', "[bus]", 'kind = "ethercat"', "[cycle]", "period_us = 20000"]
+    for number in range(groups):
+        lines += ["[[group]]", f'name = "g{number}"', "nodes = 1", "axes = 1", "read_bytes = 4", "write_bytes = 4"]
+        lines += ["execution = {kind = 'linear', base_us = 20, per_byte_us = 0}"]
+    (tmp_path / "many.toml").write_text("\n".join(lines))
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        busplan.sweep(tmp_path / "many.toml", vary={"cycle.period_us": f"1000:20000:#{points}"})

@@ -74,7 +74,11 @@ def emulated(network: Network, emulation: Emulation) -> bytes:
     numbers, polls = range(1, hyperperiod(rates(network)) + 1), int(network.profile.bus.mailbox_polls)
     cycles = [tuple(_cycle(network, number)) for number in numbers]
     filled = [any(entry.data_bytes for entry in devices_at(network, number)) for number in numbers]
-    emulation.require_few(2 * emulation.cycles * (sum(map(len, cycles)) / len(cycles) + polls))
+    bytes_each = sum(frame_bytes(sum(map(_bytes, frame))) for frames in cycles for frame in frames) / len(cycles)
+    emulation.require_few(
+        2 * emulation.cycles * (sum(map(len, cycles)) / len(cycles) + polls),
+        frames_bytes=2 * emulation.cycles * bytes_each,
+    )
     due = [cycle for cycle in range(emulation.cycles - len(cycles)) if filled[cycle % len(cycles)]]
     packets = sorted(_packets(network, emulation, cycles, due), key=lambda packet: packet[0])
     return pcapng(packets, link=ETHERNET, origin=emulation.origin)

@@ -17,6 +17,7 @@ from busplan.buses.limits import NOT_SHOWN_KEPT
 from busplan.buses.network import Network
 from busplan.buses.parts import Safety
 from busplan.elementwise import Number
+from busplan.errors import ArgumentError, BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
@@ -32,6 +33,11 @@ from busplan.sections.profile import Profile, varied_nodes
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays fit into the processor's cache."""
+
+MOST_CELLS: Final = 200_000_000
+"""Most cells of the table, of eight bytes each: a million points of one kind of nodes, fewer of many groups."""
+MOST_GROUPS: Final = 128
+"""Most groups, enough for each node of CANopen: the most nodes of each are searched, and each search counts all."""
 
 Columns = dict[str, Array]
 """Columns by name, a row for each point and timing model, each of shape (rows,).
@@ -90,7 +96,24 @@ def checked_sweep(
     varied = varied_nodes(profile).name if profile.group else ""
     if circle and not unlimited:
         require_few(grid)
-    return Sweep(profile, bus.figures, bus.safety, bus.deciding_model, grid, models, varied, circle, changes)
+    sweep = Sweep(profile, bus.figures, bus.safety, bus.deciding_model, grid, models, varied, circle, changes)
+    _require_few_cells(sweep)
+    return sweep
+
+
+def _require_few_cells(sweep: Sweep) -> None:
+    """Refuse a sweep that takes too long or too much memory because of its groups."""
+    groups, columns = len(sweep.profile.group), len(sweep.columns)
+    if groups > MOST_GROUPS:
+        raise BusplanError(
+            f"{sweep.profile.name}: {groups:,} groups are more than the {MOST_GROUPS:,} a sweep takes; join like groups"
+        )
+    most = MOST_CELLS // (columns * len(sweep.timing_models))
+    if sweep.grid.points > most:
+        raise ArgumentError(
+            f"vary: {sweep.grid.points:,} points of {columns:,} columns are too many for a sweep; vary "
+            f"less: {most:,} points"
+        )
 
 
 def figure_names(profile: Profile, register: BusFigures) -> tuple[str, ...]:
