@@ -1,5 +1,7 @@
 """Why a circle cannot be run: by its key, before any is run, and alike in every answer that is about the circle."""
 
+from pathlib import Path
+
 import pytest
 
 import busplan
@@ -44,6 +46,18 @@ def test_every_answer_about_the_circle_names_the_key(key: str, changes: dict[str
     own = busplan.map_(profile, x={"bus.nodes": [1, 2]}, y={"cycle.period_us": [1000]}, circle=True).design
     assert own is not None
     assert (own.state, own.reasons) == ("circle cannot be run", (key,))
+
+
+def test_messages_alone_have_no_circle(tmp_path: Path) -> None:
+    file = tmp_path / "car.toml"
+    file.write_text("""schema_version = 1
+name = "car"
+bus = {kind = "can", bit_rate_kbit_s = 500}
+message = [{name = "m", identifier = 1, payload_bytes = 8, period_us = 10000}]
+""")
+    with pytest.raises(BusplanError) as caught:
+        busplan.circle_test(busplan.load_profile(file))
+    assert caught.value.problems == ("bus.nodes = none: messages alone have no axes that could move",)
 
 
 @pytest.mark.parametrize("changes", CAUSES.values())
