@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.recordings.statistics import lateness, periodic_events, quantile
+from busplan.recordings.statistics import lateness, line, periodic_events, quantile
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200), st.floats(0.5, 1))
@@ -99,3 +99,21 @@ def test_a_period_and_its_uncertainty_are_the_same_backwards() -> None:
     assert backwards is not None
     assert backwards.period_us == pytest.approx(forwards.period_us, abs=1e-9)
     assert backwards.uncertainty_us == pytest.approx(forwards.uncertainty_us, rel=1e-6)
+
+
+def test_the_line_of_medians_is_numpys_weighted_fit() -> None:
+    random = np.random.default_rng(8)
+    sizes = np.repeat([10.0, 20.0, 40.0, 80.0], 15)
+    values = 5 + 0.25 * sizes + random.normal(0, 0.02 * sizes)
+    of_each = [quantile(values[sizes == size], 0.5) for size in (10, 20, 40, 80)]
+    errors = np.hypot([median.uncertainty or 0.0 for median in of_each], 0.3)
+    medians = [median.value for median in of_each]
+    (slope, level), covariance = np.polyfit((10, 20, 40, 80), medians, 1, w=1 / errors, cov="unscaled")
+    found = line(sizes, values, 0.3)
+    assert found is not None
+    left = (medians - level - slope * np.array([10, 20, 40, 80])) / errors
+    birge = max(float(np.sqrt(np.sum(left**2) / 2)), 1.0)
+    assert found == pytest.approx((slope, birge * np.sqrt(covariance[0, 0])), rel=1e-9)
+    # Fewer than ten values of a size show no median, and one size no line.
+    assert line(np.append(sizes, [160.0] * 9), np.append(values, [1e6] * 9), 0.3) == found
+    assert line(sizes[:15], values[:15], 0.3) is None

@@ -119,3 +119,13 @@ def test_a_sweep_has_at_each_point_what_capacity_has(monkeypatch: pytest.MonkeyP
         for key, value in figures.items():
             assert row[key] == (pytest.approx(value, rel=1e-12) if isinstance(value, float) else value), (key, point)
     assert len({row["verdict"] for row in rows}) > 1
+
+
+def test_a_sweep_counts_the_identifiers_that_stand_twice() -> None:
+    own = loaded({**BASE, "message": [message("early", 0x90)]})
+    identifiers = range(0x17C, 0x189)
+    rows = busplan.sweep(own, vary={"payload.command_identifier": identifiers}, timing_model=[WORST]).to_dict()["rows"]
+    # Feedback of three nodes has 0x181 to 0x183, and so have commands of three nodes that begin at 0x17F to 0x183.
+    assert [row["payload.command_identifier"] for row in rows if "identifiers" in row["exceeded"]] == [
+        *range(0x17F, 0x184)
+    ]

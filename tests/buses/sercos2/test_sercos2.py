@@ -66,6 +66,15 @@ def test_its_cycle_is_that_by_hand() -> None:
     assert terms(profile(bus__at_start_us=30.0))["wait"] == 30 + 12 + 9
 
 
+def test_the_record_of_each_drive_is_its_data_control_and_service() -> None:
+    of_drives = {"payload.read_bytes": 6, "payload.write_bytes": 10, "bus.data_rate_mbit_s": 8}
+    plan = busplan.load_profile("sercos2-servo-8", changes=of_drives)
+    mdt = [event for event in busplan.timeline(plan).cycle_events if event.term == "cycle_mdt_us"]
+    assert [(event.kind, event.node) for event in mdt] == [*(("record", node) for node in range(1, 9)), ("mdt", None)]
+    assert [event.duration_us for event in mdt[:-1]] == [8 * (10 + 2 + 2) / 8] * 8
+    assert sum(event.duration_us for event in mdt) == pytest.approx(terms(plan)["mdt"], rel=1e-12)
+
+
 def test_the_gap_is_in_the_uncertainty() -> None:
     (found,) = busplan.capacity(profile(), timing_model=["worst-stuffing"]).results
     assert found.uncertainty_us == pytest.approx(2 * 0.1 * 2 * 7)
