@@ -1,5 +1,6 @@
 """What a kind of bus offers for a profile: settings that a plan may change, and small changes of a sensitivity."""
 
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 import busplan
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import network_of
+from busplan.sections.base import value_at
 from tests.registers import shipped_names
 
 VARIANTS = (
@@ -68,6 +70,10 @@ def test_a_small_change_costs_time_and_one_that_is_not_offered_costs_none(profil
             assert small.why_not, small
             continue
         more_us = required_us(changed) - required_us(profile)
+        if step := re.search(r"\+([0-9.]+) |one more", small.label):
+            ((key, after),) = small.changes.items()
+            before = value_at(profile, key) or 0
+            assert after - before == pytest.approx(float(step[1] or 1)) or key == "bus.max_hops", small
         if small.why_not:
             assert changed == profile or more_us == 0, small
         else:

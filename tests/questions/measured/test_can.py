@@ -405,6 +405,7 @@ def test_a_pdo_outside_its_own_bound_is_outside_even_where_the_cycle_fits(tmp_pa
     answer = of_log(candump(logged), tmp_path, plan=plan)
     feedback = figure(answer, "feedback: response")
     assert [figure.quantity for figure in answer.outside] == ["feedback: response"]
+    assert not any(key.startswith("bus.host") for key in answer.edits)  # the host is within its plan
     (at,) = (place for place, frame in enumerate(logged) if frame.queued.us == 406_350.0)
     assert (feedback.key, feedback.note) == ("node.execution", "the latest: feedback of node 8 (0x188)")
     assert (feedback.first_frame, feedback.worst_frame) == (at + 1, at + 1)
