@@ -18,6 +18,7 @@ from busplan.servo.axis import simulate_axis
 from busplan.servo.circle import CircleRun, check_circle, simulate_circle
 from busplan.servo.contour import contour_error
 from busplan.servo.delivery import Arrivals
+from busplan.servo.margins import LoopMargins
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath, circle_path
 
@@ -304,6 +305,14 @@ def test_an_unstable_loop_ends_as_one(loop: str, gain: float) -> None:
     assert math.isfinite(run.contour.mean_contour_error_mm)
     assert run.contour.max_contour_error_mm > 0.01
     assert not a_run(an_axis(delay_us=2000.0), timing=timing).diverged
+
+
+def test_one_unstable_loop_is_enough_to_diverge() -> None:
+    # Slow to grow: within a turn the error stays far below the radius.
+    run = a_run(an_axis())
+    assert not run.diverged
+    assert replace(run, margins_x=LoopMargins(stable=False)).diverged
+    assert replace(run, margins_y=LoopMargins(stable=False)).diverged
 
 
 def test_a_table_that_runs_away_has_diverged() -> None:
