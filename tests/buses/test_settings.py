@@ -72,8 +72,8 @@ def test_a_small_change_costs_time_and_one_that_is_not_offered_costs_none(profil
         more_us = required_us(changed) - required_us(profile)
         if step := re.search(r"\+([0-9.]+) |one more", small.label):
             ((key, after),) = small.changes.items()
-            before = value_at(profile, key) or 0
-            assert after - before == pytest.approx(float(step[1] or 1)) or key == "bus.max_hops", small
+            before = float(value_at(profile, key) or 0)
+            assert float(after) - before == pytest.approx(float(step[1] or 1)) or key == "bus.max_hops", small
         if small.why_not:
             assert changed == profile or more_us == 0, small
         else:
