@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
@@ -350,14 +350,15 @@ def _default_direction(key: str, network: Network) -> Direction:
     """A direction along `AXES` or `PERIOD` that shows where the design stops fitting."""
     varied = varied_nodes(network.profile)
     design_us, design_nodes = network.profile.cycle.period_us, int(varied.nodes)
-    # If not even one node fits at any period, the range follows from the design's period alone.
-    fit_us = _periods_of_nodes(network, varied.name) or [design_us]
+    most, fit_us = _periods_of_nodes(network, varied.name)
+    if not most:  # not even one node fits at any period: the range follows from the design's period alone
+        most, fit_us = 1, lambda _: design_us
     # Chosen: the largest of twice the design's period; what its nodes need, and a quarter more; and what the most nodes
     # need, and a quarter more, but four times the design's period at most.
-    to_us = max(2 * design_us, 1.25 * fit_us[min(design_nodes, len(fit_us)) - 1], min(4 * design_us, 1.25 * fit_us[-1]))
-    from_us = min(design_us, fit_us[0], to_us / 4) / 1.25
+    to_us = max(2 * design_us, 1.25 * fit_us(min(design_nodes, most)), min(4 * design_us, 1.25 * fit_us(most)))
+    from_us = min(design_us, fit_us(1), to_us / 4) / 1.25
     if key == AXES:
-        most = bisect_right(fit_us, to_us * (1 + FIT_ROUNDING))
+        most = bisect_right(range(1, most + 1), to_us * (1 + FIT_ROUNDING), key=fit_us)
         counts, node_axes = _counts(design_nodes, most), int(varied.node.axes)
         if not node_axes:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, counts)
@@ -373,15 +374,16 @@ def _default_direction(key: str, network: Network) -> Direction:
     return Direction(PERIOD, tuple(sorted({*periods_us, design_us})))
 
 
-def _periods_of_nodes(network: Network, group: str) -> list[float]:
-    """Shortest periods at which 1, 2, ... nodes of a group are shown to fit, up to the most that ever fit [us]."""
+def _periods_of_nodes(network: Network, group: str) -> tuple[int, Callable[[int], float]]:
+    """The most nodes of a group that are shown to fit at any period, and the shortest period by their number [us]."""
     bus = network.bus
     most, _ = safe_nodes(at_period(network, min(MAX_TIME_US, bus.periods.longest_us)), group=group)
-    counts = np.arange(1, most + 1)
-    cycle = bus.cycle(network.with_nodes(counts, group=group), model=bus.deciding_model)
-    needed_us = np.asarray(certainty(cycle).safe_required_us)
-    periods_us = shortest_period_us(cycle.network, needed_us, is_shown=True)
-    return [float(us) for us in np.broadcast_to(np.asarray(periods_us), counts.shape)]
+
+    def fit_us(nodes: int) -> float:
+        cycle = bus.cycle(network.with_nodes(nodes, group=group), model=bus.deciding_model)
+        return float(shortest_period_us(cycle.network, certainty(cycle).safe_required_us, is_shown=True))
+
+    return most, fit_us
 
 
 def _counts(design: int, most: int) -> tuple[int, ...]:
