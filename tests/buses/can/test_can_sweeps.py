@@ -122,10 +122,7 @@ def test_a_sweep_has_at_each_point_what_capacity_has(monkeypatch: pytest.MonkeyP
 
 
 def test_a_sweep_counts_the_identifiers_that_stand_twice() -> None:
-    own = loaded({**BASE, "message": [message("early", 0x90)]})
-    identifiers = range(0x17C, 0x189)
-    rows = busplan.sweep(own, vary={"payload.command_identifier": identifiers}, timing_model=[WORST]).to_dict()["rows"]
-    # Feedback of three nodes has 0x181 to 0x183, and so have commands of three nodes that begin at 0x17F to 0x183.
-    assert [row["payload.command_identifier"] for row in rows if "identifiers" in row["exceeded"]] == [
-        *range(0x17F, 0x184)
-    ]
+    own = loaded({**BASE, "payload": {**BASE["payload"], "command_identifier": 0x185}})
+    rows = busplan.sweep(own, vary={"bus.nodes": range(1, 9)}, timing_model=[WORST]).to_dict()["rows"]
+    # Feedback begins at 0x181: that of five nodes ends where commands begin.
+    assert [row["bus.nodes"] for row in rows if "identifiers" in row["exceeded"]] == [5, 6, 7, 8]
