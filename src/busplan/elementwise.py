@@ -446,13 +446,13 @@ def interpolated(places: Sequence[float], values: Sequence[float], place: Number
     return Traced(value_of(between), operation=CHOSEN, parts=(between, *sources))
 
 
-def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> Number:
+def pointwise(function: Callable[..., Any], *numbers: Number, words: str) -> Any:
     """Result of a function of plain numbers, point by point: for results that only a search can tell.
 
     Parameters
     ----------
     function
-        The function.
+        The function. It returns a number, or a tuple of several.
     numbers
         Its arguments; arrays broadcast.
     words
@@ -467,15 +467,20 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
         return function(*numbers)
     if any(isinstance(number, Traced) for number in numbers):
         with constants_looked_up(None):
-            value = function(*map(value_of, numbers))
-        return Traced(value, formula=words, numbers=short(value), parts=numbers)
+            found = function(*map(value_of, numbers))
+        of_each = [
+            Traced(value, formula=words, numbers=short(value), parts=numbers)
+            for value in (found if isinstance(found, tuple) else (found,))
+        ]
+        return tuple(of_each) if isinstance(found, tuple) else of_each[0]
     import numpy as np
 
     # Plain numbers are repeated, and arrays read as they are asked for: neither their number nor their size is bounded.
     given: tuple[Any, ...] = numbers
     shape = np.broadcast_shapes(*map(np.shape, given))
     points = zip(*(_points(number, shape) for number in given), strict=False)
-    return np.array([function(*point) for point in points], dtype=float).reshape(shape)
+    found = np.array([function(*point) for point in points], dtype=float)
+    return tuple(column.reshape(shape) for column in found.T) if found.ndim > 1 else found.reshape(shape)
 
 
 def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[float]:

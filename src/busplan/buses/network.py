@@ -39,9 +39,10 @@ def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int
     >>> numbers_by_due([Rate(1), Rate(3, first=2)])
     {(True, False): (1, 3), (True, True): (2,)}
     """
-    numbers: dict[tuple[bool, ...], list[int]] = {}
-    for number in range(1, hyperperiod(rates) + 1):
-        numbers.setdefault(tuple(rate.is_due(number) for rate in rates), []).append(number)
+    cycles, numbers = range(1, hyperperiod(rates) + 1), dict[tuple[bool, ...], list[int]]()
+    of_rate = {rate: [rate.is_due(number) for number in cycles] for rate in set(rates)}
+    for number, due in zip(cycles, zip(*map(of_rate.get, rates), strict=True) if rates else [()], strict=True):
+        numbers.setdefault(due, []).append(number)
     return {due: tuple(cycles) for due, cycles in numbers.items()}
 
 

@@ -2,9 +2,8 @@
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
-from itertools import chain
-from math import lcm
+from itertools import chain, compress
+from math import isqrt, lcm
 from typing import Final, NamedTuple
 
 from busplan.buses.cycle import Doubt
@@ -28,7 +27,6 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.network import Group, Network, Rate, numbers_by_due
 from busplan.elementwise import (
     Number,
-    are_plain,
     choose,
     is_everywhere,
     is_off,
@@ -194,8 +192,9 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
 
 MOST_CYCLES: Final = 1000
 """Longest hyperperiod that is computed [cycles]."""
-_MOST_PLACES: Final = 50_000
-"""Most groups times cycles of their hyperperiod: they bound the memory."""
+_MOST_WORK: Final = 1_500_000
+_WORK_BESIDE: Final = 40
+"""Most groups squared, times their cycles and what takes as long as so many: the time to count nodes of each group."""
 
 
 class Unit(NamedTuple):
@@ -232,12 +231,14 @@ def checked_hyperperiod(rates: Sequence[int]) -> int:
 
     Raises `BusplanError` where it exceeds `MOST_CYCLES`, or less for many groups.
     """
-    cycles, most = lcm(*rates), _MOST_PLACES // max(len(rates), 1)
-    if cycles > min(most, MOST_CYCLES):
-        shown = ", ".join(map(str, sorted(set(rates))))
-        most_words = f"{MOST_CYCLES}" if most >= MOST_CYCLES else f"{most} of {len(rates)} groups"
+    cycles, groups = lcm(*rates), len(rates)
+    most = min(MOST_CYCLES, _MOST_WORK // max(groups, 1) ** 2 - _WORK_BESIDE)
+    if cycles > max(most, 1):
+        shown, most_groups = ", ".join(map(str, sorted(set(rates)))), isqrt(_MOST_WORK // (_WORK_BESIDE + 2))
+        of_groups = f"{most} of {groups} groups" if groups <= most_groups else f"{most_groups} groups at several rates"
         raise BusplanError(
-            f"the rates of {shown} repeat together only after {cycles} cycles; busplan computes at most {most_words}"
+            f"the rates of {shown} repeat together only after {cycles} cycles; busplan computes at most "
+            f"{MOST_CYCLES if most == MOST_CYCLES else of_groups}"
         )
     return cycles
 
@@ -275,9 +276,9 @@ def unit_cycles(
     `is_spread` spreads slower units over the cycles as evenly as possible; otherwise they share a cycle. Raises
     `BusplanError` where the hyperperiod exceeds `MOST_CYCLES`.
     """
-    cycles = []
+    whole, cycles = [unit.present(is_due=True) for unit in units], []
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
-        present = [unit.present(is_due=True) for unit, is_due in zip(units, due, strict=True) if is_due]
+        present = [*compress(whole, due)]
         runs = list(frames_of(present, datagrams=datagrams, first_bytes=first_bytes))
         wire_bytes = total(run.frames * frame_bytes(run.datagrams_bytes) for run in runs)
         last_bytes = runs[-1].datagrams_bytes if runs else 0.0
@@ -325,24 +326,11 @@ def devices(network: Network) -> tuple[Devices, ...]:
     whole = _all_devices(network)
     if not has_rates(network):
         return whole
-    numbers = _cycle_inputs(network, whole)
-    if are_plain(*numbers):
-        is_there = _cycles(network, numbers)[0].due
-        return tuple(
-            entry if is_due else entry._replace(data_bytes=0) for entry, is_due in zip(whole, is_there, strict=True)
-        )
-
-    @cache  # every group asks of the same numbers
-    def due(*numbers: float) -> tuple[bool, ...]:
-        return _cycles(network, numbers)[0].due
-
-    def is_in(index: int) -> Number:
-        words = "whether the group goes in the fullest cycle"
-        return pointwise(lambda *numbers: float(due(*numbers)[index]), *numbers, words=words)
-
+    words = "whether the group goes in the fullest cycle"
+    due = pointwise(lambda *numbers: _cycles(network, numbers)[0].due, *_cycle_inputs(network, whole), words=words)
     return tuple(
-        entry._replace(data_bytes=choose(is_in(index) > 0, entry.data_bytes, 0)) if group.is_slower else entry
-        for index, (entry, group) in enumerate(zip(whole, network.groups, strict=True))
+        entry._replace(data_bytes=choose(is_due > 0, entry.data_bytes, 0)) if group.is_slower else entry
+        for entry, group, is_due in zip(whole, network.groups, due, strict=True)
     )
 
 

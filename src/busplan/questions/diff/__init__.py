@@ -273,10 +273,12 @@ def _figures(
         yield from _compared("deciding", cycle, a.figures, b.figures)
         return
     for model in models:
-        yield from _compared(model, cycle, *(_of_model(network, model) for network in (network_a, network_b)))
+        yield from _compared(model, cycle, *(_of_model(model, *side) for side in (side_a, side_b)))
 
 
-def _of_model(network: Network, model: str) -> FitFigures:
+def _of_model(model: str, side: DiffSide, network: Network) -> FitFigures:
+    if model == side.figures.timing_model:
+        return side.figures
     with constants_changed(network.profile.constants):
         return capacity_figures(network, model=model)
 

@@ -259,8 +259,7 @@ def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
 
 def has_arrays(network: Network) -> bool:
     """Whether its limits are computed for many numbers of nodes at once, in arrays, and not point by point."""
-    is_slow = any(limit.is_slow for limit in network.bus.limits) or any(group.is_slower for group in network.groups)
-    return not is_slow
+    return not any(limit.is_slow for limit in network.bus.limits)
 
 
 Counts: TypeAlias = tuple[tuple[int, str], tuple[int, str] | None]
