@@ -108,7 +108,20 @@ def test_what_takes_too_long_of_many_groups_is_refused_and_the_report_says_so(tm
     with pytest.raises(busplan.BusplanError, match=r"400 settings of 60 groups and messages .* up to 333 settings"):
         busplan.explore(path, x=few, y={"cycle.period_us": range(1000, 21_000, 1000)}, over={"bus.gap_count": [63]})
     (page,) = busplan.report(path).to_dict()["profiles"]
-    assert page["missing"] == ["What moves the margin is not shown: it is for up to 50 groups."]
+    reason = "60 groups: sensitivity changes each by itself, of up to 50"
+    assert page["missing"] == [f"What moves the margin is not shown: {reason}."]
+
+
+@pytest.mark.slow
+def test_sensitivity_of_many_messages_is_refused(tmp_path: Path) -> None:
+    data = with_groups(1, "can")
+    data["bus"] |= {"bit_rate_kbit_s": 1000}
+    message = {"payload_bytes": 8, "period_us": 1e6, "identifier_bits": 29}
+    data["message"] = [{**message, "name": f"m{place}", "identifier": 0x10000 + place} for place in range(1001)]
+    path = tmp_path / "p.toml"
+    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    with pytest.raises(busplan.BusplanError, match=r"1,001 messages: sensitivity computes all of them .*, up to 1,000"):
+        busplan.capacity(path, sensitivity=True)
 
 
 @pytest.mark.parametrize(

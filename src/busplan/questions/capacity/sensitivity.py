@@ -300,17 +300,27 @@ class Sensitivity(NamedTuple):
     """Empty for a network that is not shown to fit."""
 
 
-MOST_GROUPS: Final = 50
-"""Most groups that are changed, each by itself."""
+_MOST_GROUPS: Final = 50
+_MOST_MESSAGES: Final = 1000
+
+
+def too_large(profile: Any) -> str:
+    """Why a profile is too large for its sensitivity; empty if it is not."""
+    groups, messages = len(profile.node_groups), len(getattr(profile, "message", ()))
+    if groups > _MOST_GROUPS:
+        return f"{groups:,} groups: sensitivity changes each by itself, of up to {_MOST_GROUPS}"
+    if messages > _MOST_MESSAGES:
+        return f"{messages:,} messages: sensitivity computes all of them for each change, up to {_MOST_MESSAGES:,}"
+    return ""
 
 
 def sensitivity_of(network: Network, now: CapacityFigures) -> Sensitivity:
     """Every small change of a network, with its cycle computed anew; `now` has the figures of the model that decides.
 
-    BusplanError: the network has too many groups.
+    BusplanError: the network has too many groups or messages.
     """
-    if (groups := len(network.profile.node_groups)) > MOST_GROUPS:
-        raise BusplanError(f"{groups:,} groups: sensitivity changes each by itself, of up to {MOST_GROUPS}")
+    if reason := too_large(network.profile):
+        raise BusplanError(reason)
     effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     is_well = now.verdict == FITS and now.safe

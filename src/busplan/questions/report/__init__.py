@@ -33,7 +33,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.arguments import FilePath, Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.base.sentences import changed_report, document
 from busplan.questions.capacity import capacity
-from busplan.questions.capacity.sensitivity import MOST_GROUPS
+from busplan.questions.capacity.sensitivity import too_large
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.circle import circle_test
 from busplan.questions.explain import explain
@@ -283,10 +283,11 @@ def _reported(
     recorded: _Recording | None,
     progress: Progress | None,
 ) -> ReportedProfile:
-    is_varied = profile.has_cycle and len(profile.node_groups) <= MOST_GROUPS
+    reason = too_large(profile)
+    is_varied = profile.has_cycle and not reason
     bus, made = capacity(profile, sensitivity=is_varied), _Sections(profile, argument, changes)
-    if profile.has_cycle and not is_varied:
-        made.missing.append(f"What moves the margin is not shown: it is for up to {MOST_GROUPS} groups.")
+    if profile.has_cycle and reason:
+        made.missing.append(f"What moves the margin is not shown: {reason}.")
     of_bus = made.command("capacity", *(("--sensitivity",) if is_varied else ()))
     answers = (
         PageSection("capacity", "Every figure of the cycle", of_bus, bus.report()),
