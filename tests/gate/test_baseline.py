@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
+from busplan.gate.baseline import MODELS, read_baseline
 
 Changed = Callable[..., str]
 Check = Callable[..., Any]
@@ -299,3 +300,25 @@ def test_three_files_are_named_and_the_others_counted(count: int, words: str, cl
     Path("baseline.json").write_text(Path("baseline.json").read_text().replace("0.toml", "gone.toml"))
     *_, unmatched = busplan.check([f"{number}.toml" for number in range(count)], baseline="baseline.json").files
     assert f"no record ({words}), " in str(unmatched.failure)
+
+
+def test_records_are_named_from_the_folder_of_the_baseline_or_the_working_folder(
+    clean: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "line"
+    folder.mkdir()
+    (folder / "a.toml").write_text(clean, encoding="utf-8")
+    text = json.dumps({**GOOD, "models": MODELS, "profiles": {"a.toml": {"standard.max_axes": 61}}})
+    (folder / "b.json").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+    def found(path: str, baseline: Any) -> tuple[list[str], bool]:
+        file, *more = busplan.check(path, baseline=baseline).files
+        return [finding.code for finding in file.findings], bool(more)
+
+    assert found("line/a.toml", "line/b.json") == (["BP301"], False)
+    # Its content alone is of no folder: in this one there is no a.toml, and line/a.toml has no record.
+    content = read_baseline(text, name="the baseline")
+    assert found("line/a.toml", content) == ([], True)
+    monkeypatch.chdir(folder)
+    assert found("a.toml", content) == (["BP301"], False)
