@@ -322,3 +322,35 @@ def test_records_are_named_from_the_folder_of_the_baseline_or_the_working_folder
     assert found("line/a.toml", content) == ([], True)
     monkeypatch.chdir(folder)
     assert found("a.toml", content) == (["BP301"], False)
+
+
+MESSAGES = """\
+schema_version = 1
+name = "car"
+[bus]
+kind = "can"
+bit_rate_kbit_s = 500
+[[message]]
+name = "m"
+identifier = 1
+payload_bytes = 8
+period_us = 10000
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        # A frame of 111 bits and up to 24 of stuffing in 10 ms at 500 kbit/s.
+        ("= 500", "= 250", "bus.bit_rate_kbit_s: 250, was 500: bus load rose from 2.7 to 5.4 %, expected load from "),
+        ("= 500", "= 1000", ""),
+        ("= 10000", "= 5000", "message.m.period_us: 5000, was 10000: bus load rose from 2.7 to 5.4 %, expected load "),
+        ("= 10000", "= 20000", ""),
+    ],
+)
+def test_of_messages_alone_the_load_is_held(old: str, new: str, words: str, check: Check) -> None:
+    before = record(check(MESSAGES))
+    assert before["figures"]["worst-stuffing.bus_load"] == pytest.approx(135 / 5000)
+    found = check(MESSAGES.replace(old, new), baseline=before).findings
+    assert [one.code for one in found] == ["BP301"] * bool(words)
+    assert all(one.problem.startswith(words) for one in found)

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 import busplan
+from busplan.questions.fit.cure import settings_to_be_carried
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.needs import Need, missed_limits, smallest_period, to_be_shown, unmet
 from busplan.questions.fit.network import at_period, network_of
@@ -157,3 +158,21 @@ def test_a_limit_that_is_missed_says_what_it_takes(
 ) -> None:
     network = network_of(busplan.load_profile(name, changes={"limits": limits}))
     assert [tuple(one) for one in missed_limits(network)] == missed
+
+
+@pytest.mark.parametrize(
+    ("changes", "setting"),
+    [
+        ({}, {}),
+        # However short the period is: some slice carries it.
+        ({"cycle__period_us": 1.0, "cycle__slice_ratio": 0.01}, {}),
+        ({"bus__gap_count": 3}, {"bus.gap_count": 7}),
+        # No setting is safe for longer cables, and none carries more hops.
+        ({"bus__gap_count": 3, "bus__cable_length_m": 10.0}, {}),
+        ({"bus__gap_count": 3, "bus__nodes": 17}, {}),
+    ],
+)
+def test_a_network_that_no_slice_carries_has_the_cheapest_setting_that_does(
+    make: Make, changes: dict[str, Any], setting: dict[str, Any]
+) -> None:
+    assert settings_to_be_carried(network_of(make(**changes))) == setting
