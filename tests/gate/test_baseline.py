@@ -354,3 +354,10 @@ def test_of_messages_alone_the_load_is_held(old: str, new: str, words: str, chec
     found = check(MESSAGES.replace(old, new), baseline=before).findings
     assert [one.code for one in found] == ["BP301"] * bool(words)
     assert all(one.problem.startswith(words) for one in found)
+
+
+@pytest.mark.parametrize(("more", "is_lost"), [(0.9e-9, False), (1.1e-9, True)])
+def test_a_share_is_rounded_as_a_whole_of_1(more: float, is_lost: bool, check: Check) -> None:
+    before = record(check(MESSAGES))
+    before["figures"]["worst-stuffing.bus_load"] -= more
+    assert bool(check(MESSAGES, baseline=before).findings) is is_lost

@@ -143,6 +143,7 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
         assert set(one) - {"failure"} == own
         assert (one["verdict"] is None) == (one["profile"] is None) == (one["uncertainty_us"] is None)
     assert [one["verdict"] for one in document["files"][:2]] == ["fits", "does not fit"]
+    assert {"key": "bus.max_hops", "words": "a chain of cables"} in document["files"][0]["rests_on"]
     (first, second) = document["files"][1]["findings"]
     assert list(first) == [
         *("code", "rule", "severity", "message", "key", "line", "column", "marked_column", "marked_end_column"),
@@ -151,6 +152,7 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
     assert (first["code"], first["key"], first["line"], first["column"]) == ("BP110", "bus.gap_count", 7, 1)
     assert (first["marked_column"], first["marked_end_column"]) == (13, 15)  # gap_count = 63
     assert (first["help"], first["cure"]) == (None, None)
+    assert first["problem"].startswith("bus.gap_count: gap count 63 is above the 7 that 2 hops need; ")
     assert first["message"] == first["problem"]
     assert second["cure"].endswith("\nbus.gap_count = 7")
     joined = second["cure"].replace("\n", ", ")

@@ -1,5 +1,6 @@
 """The gate over one document: what it finds, where, and in which order."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -206,6 +207,11 @@ def test_a_full_slice_has_its_cheapest_cure(
     text = changed(('"optimal"', gap_count), more=f"\n[limits]\nmax_utilisation = {limit}\n")
     (finding,) = [one for one in check(text).findings if one.code == "BP103"]
     assert finding.message.rpartition("cheapest cure: ")[2].startswith(cure)
+    used = {"63": "12.66", '"optimal"': "8.90"}[gap_count]
+    shown = re.match(r"limits\.max_utilisation: ([\d.]+)% of the slice is used, ([\d.]+)% allowed;", finding.message)
+    assert shown is not None
+    assert float(shown[1]) == pytest.approx(float(used), abs=0.06)
+    assert float(shown[2]) == pytest.approx(100 * limit)
 
 
 @pytest.mark.parametrize(("parts", "code"), [(20, "BP002"), (21, "BP001"), (40_000, "BP001")])

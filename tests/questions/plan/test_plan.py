@@ -138,6 +138,14 @@ ETHERCAT: dict[str, Any] = {"payload.read_bytes": 400, "payload.write_bytes": 70
     [
         # A slice of 237.4 us: in 400 us a share of 0.594, and a period of 474.8 us at the profile's half.
         ("", {"cycle.period_us": 400.0}, "slice_ratio", {"cycle.slice_ratio": 0.6}, {"cycle.slice_ratio": 0.59}),
+        # Of two that ask for more the larger counts: 192.04 us are to be 70 % of the slice at most.
+        (
+            "",
+            {"cycle.period_us": 400.0, "limits.max_utilisation": 0.7},
+            "slice_ratio",
+            {"cycle.slice_ratio": 0.69},
+            {"cycle.slice_ratio": 0.68},
+        ),
         ("", {"cycle.period_us": 400.0}, "period", {"cycle.period_us": 475.0}, {"cycle.period_us": 474.0}),
         ("", {"cycle.period_us": 2000.0, "bus.nodes": 9}, "nodes", {"bus.nodes": 7}, {"bus.nodes": 8}),
         # Quadlets of the larger payload alone, and of both; single bytes.
@@ -350,6 +358,14 @@ def test_a_row_that_changes_nothing_is_a_word_below_the_table() -> None:
 def test_what_was_asked_for_is_named_where_nothing_else_changes() -> None:
     said = str(busplan.plan("paper-4ms", nodes=3)).splitlines()[0]
     assert "(12 axes) at 4 ms: bus.nodes = 3 is all that changes; it fits with a corrected margin of " in said
+
+
+@pytest.mark.parametrize(
+    ("axes", "wanted"), [(8, {}), (9, {"bus.nodes": 3}), (12, {"bus.nodes": 3}), (3, {"bus.nodes": 1})]
+)
+def test_axes_are_on_as_many_nodes_as_it_takes(axes: int, wanted: dict[str, int]) -> None:
+    # Four on each; there are two nodes.
+    assert busplan.plan("paper-4ms", axes=axes).wanted == wanted
 
 
 def test_a_change_of_a_group_has_the_meaning_of_the_key() -> None:
