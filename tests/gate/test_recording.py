@@ -95,6 +95,7 @@ def test_what_cannot_be_compared_is_no_finding(run: Run, tmp_path: Path) -> None
     # A profile in memory is one, too.
     car = busplan.load_profile(LOG.parent / "valid.toml")
     assert busplan.check(car, recording=LOG).findings == ()
-    for profiles in (["paper-4ms", "paper-dma"], [car, car], [car, "paper-4ms"]):
+    several: tuple[list[busplan.Profile | str], ...] = (["paper-4ms", "paper-dma"], [car, car], [car, "paper-4ms"])
+    for profiles in several:
         with pytest.raises(busplan.BusplanError, match="needs exactly one profile"):
             busplan.check(profiles, recording=CAPTURE)

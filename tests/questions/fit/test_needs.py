@@ -13,12 +13,13 @@ from busplan.questions.fit.needs import Need, missed_limits, smallest_period, to
 from busplan.questions.fit.network import at_period, network_of
 
 Make = Callable[..., busplan.Profile]
-LIMITS = {"limits": {"min_spare_nodes": 1, "min_spare_axes": 3, "max_utilisation": 0.6}}
+LIMITS: dict[str, object] = {"limits": {"min_spare_nodes": 1, "min_spare_axes": 3, "max_utilisation": 0.6}}
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "ethercat-servo-8", "sercos3-servo-8", "can-motors-8"])
 def test_at_the_smallest_period_all_holds_and_below_it_something_does_not(name: str) -> None:
-    asked, free = (network_of(busplan.load_profile(name, changes=limits)) for limits in (LIMITS, {"limits": {}}))
+    asked = network_of(busplan.load_profile(name, changes=LIMITS))
+    free = network_of(busplan.load_profile(name, changes={"limits": {}}))
     least, fastest = smallest_period(asked), smallest_period(asked, is_safe=False, with_limits=False)
     assert least.us is not None
     assert fastest.us is not None
