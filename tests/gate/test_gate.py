@@ -116,7 +116,7 @@ def test_the_circle_is_tested_for_profiles_that_ask_and_when_asked(clean: str, c
 
 
 def test_a_circle_that_was_asked_for_and_not_run_is_counted(clean: str, gate: Check) -> None:
-    asks = clean + "\n[servo]\nposition_gain_per_s = 50\n"
+    asks = clean + "\n[circle]\nradius_mm = 1\n"
     counts = [gate(text, circle=circle).summary.circles_not_run for text in (clean, asks) for circle in (True, False)]
     assert counts == [0, 0, 0, 1]
 

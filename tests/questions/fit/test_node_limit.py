@@ -122,7 +122,7 @@ def test_the_counts_of_many_groups_at_once_are_those_of_each_alone(tmp_path: Pat
     assert len(network.groups) < len(network.profile.node_groups) == 18
     limits = limits_with_time(network, model="standard")
     found = node_counts(network, model="standard")
-    for count in found[::4]:
+    for count in found[::6]:
         most = most_nodes(partial(network.with_nodes, group=count.name), limits)
         assert (count.max_nodes, count.limited_by) == most.words
         assert (count.safe_nodes, count.safe_limited_by) == safe_nodes(network, group=count.name)
