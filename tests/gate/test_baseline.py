@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
+from busplan.gate.baseline import MODELS, read_baseline
 
 Changed = Callable[..., str]
 Check = Callable[..., Any]
@@ -299,3 +300,64 @@ def test_three_files_are_named_and_the_others_counted(count: int, words: str, cl
     Path("baseline.json").write_text(Path("baseline.json").read_text().replace("0.toml", "gone.toml"))
     *_, unmatched = busplan.check([f"{number}.toml" for number in range(count)], baseline="baseline.json").files
     assert f"no record ({words}), " in str(unmatched.failure)
+
+
+def test_records_are_named_from_the_folder_of_the_baseline_or_the_working_folder(
+    clean: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "line"
+    folder.mkdir()
+    (folder / "a.toml").write_text(clean, encoding="utf-8")
+    text = json.dumps({**GOOD, "models": MODELS, "profiles": {"a.toml": {"standard.max_axes": 61}}})
+    (folder / "b.json").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+    def found(path: str, baseline: Any) -> tuple[list[str], bool]:
+        file, *more = busplan.check(path, baseline=baseline).files
+        return [finding.code for finding in file.findings], bool(more)
+
+    assert found("line/a.toml", "line/b.json") == (["BP301"], False)
+    # Its content alone is of no folder: in this one there is no a.toml, and line/a.toml has no record.
+    content = read_baseline(text, name="the baseline")
+    assert found("line/a.toml", content) == ([], True)
+    monkeypatch.chdir(folder)
+    assert found("a.toml", content) == (["BP301"], False)
+
+
+MESSAGES = """\
+schema_version = 1
+name = "car"
+[bus]
+kind = "can"
+bit_rate_kbit_s = 500
+[[message]]
+name = "m"
+identifier = 1
+payload_bytes = 8
+period_us = 10000
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        # A frame of 111 bits and up to 24 of stuffing in 10 ms at 500 kbit/s.
+        ("= 500", "= 250", "bus.bit_rate_kbit_s: 250, was 500: bus load rose from 2.7 to 5.4 %, expected load from "),
+        ("= 500", "= 1000", ""),
+        ("= 10000", "= 5000", "message.m.period_us: 5000, was 10000: bus load rose from 2.7 to 5.4 %, expected load "),
+        ("= 10000", "= 20000", ""),
+    ],
+)
+def test_of_messages_alone_the_load_is_held(old: str, new: str, words: str, check: Check) -> None:
+    before = record(check(MESSAGES))
+    assert before["figures"]["worst-stuffing.bus_load"] == pytest.approx(135 / 5000)
+    found = check(MESSAGES.replace(old, new), baseline=before).findings
+    assert [one.code for one in found] == ["BP301"] * bool(words)
+    assert all(one.problem.startswith(words) for one in found)
+
+
+@pytest.mark.parametrize(("more", "is_lost"), [(0.9e-9, False), (1.1e-9, True)])
+def test_a_share_is_rounded_as_a_whole_of_1(more: float, is_lost: bool, check: Check) -> None:
+    before = record(check(MESSAGES))
+    before["figures"]["worst-stuffing.bus_load"] -= more
+    assert bool(check(MESSAGES, baseline=before).findings) is is_lost

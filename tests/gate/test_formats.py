@@ -143,6 +143,7 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
         assert set(one) - {"failure"} == own
         assert (one["verdict"] is None) == (one["profile"] is None) == (one["uncertainty_us"] is None)
     assert [one["verdict"] for one in document["files"][:2]] == ["fits", "does not fit"]
+    assert {"key": "bus.max_hops", "words": "a chain of cables"} in document["files"][0]["rests_on"]
     (first, second) = document["files"][1]["findings"]
     assert list(first) == [
         *("code", "rule", "severity", "message", "key", "line", "column", "marked_column", "marked_end_column"),
@@ -151,6 +152,7 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
     assert (first["code"], first["key"], first["line"], first["column"]) == ("BP110", "bus.gap_count", 7, 1)
     assert (first["marked_column"], first["marked_end_column"]) == (13, 15)  # gap_count = 63
     assert (first["help"], first["cure"]) == (None, None)
+    assert first["problem"].startswith("bus.gap_count: gap count 63 is above the 7 that 2 hops need; ")
     assert first["message"] == first["problem"]
     assert second["cure"].endswith("\nbus.gap_count = 7")
     joined = second["cure"].replace("\n", ", ")
@@ -261,6 +263,26 @@ def test_a_very_long_line_is_shown_around_its_column(column: int, full_of: Calla
     assert line.endswith("...") == (column < 99_000)
 
 
+def marked_line(full_of: Callable[..., list[str]], source: str, column: int, end: int) -> tuple[str, str]:
+    _, _, line, caret, *_ = full_of(source, column, end)
+    return line.removeprefix("12 | "), caret.removeprefix("   | ")
+
+
+def test_a_line_is_cut_where_it_is_wider_than_the_page(full_of: Callable[..., list[str]]) -> None:
+    # 95 columns are left of 100, less three on each side where something is cut.
+    whole, rule = "a" * 94, " unknown-key"
+    assert marked_line(full_of, f"{whole}b", 1, 2) == (f"{whole}b", f"^{rule}")
+    assert marked_line(full_of, f"{whole}bc", 1, 2) == (f"{'a' * 89}...", f"^{rule}")
+    # The mark is shown first, and where it fills the line alone, without the name of the rule.
+    long = f"key = {'x' * 88} end"
+    assert marked_line(full_of, long, 7, 95) == (f"... {'x' * 88}...", f"    {'^' * 88}")
+    assert marked_line(full_of, f"key = {'x' * 200} end", 7, 207) == (f"...{'x' * 89}...", f"   {'^' * 89}")
+    # Half of what is left is for what stands behind it.
+    shown, under = marked_line(full_of, f"{'b' * 100}xxx{'c' * 100}", 101, 104)
+    assert shown == f"...{'b' * 43}xxx{'c' * 43}..."
+    assert under == f"{' ' * 46}^^^{rule}"
+
+
 LONG = "the cycle needs 348.5 us of 250.0 us, corrected margin -98.5 +/- 6.3 us, " * 3
 
 
@@ -276,6 +298,16 @@ def test_full_keeps_to_the_width_and_breaks_no_figure(width: int, warned: Answer
     )
     if width == 100:
         assert shown == render(found, file_format="full").splitlines()
+
+
+def test_a_sentence_breaks_between_words_alone(warned: Answer) -> None:
+    words = f"{'a' * 60} closed-form-of-the-paper {'b' * 120} end"
+    shown = render(report(warned, finding_at(warned, 12, 1, 2, words=words)), file_format="full").splitlines()
+    assert shown[:3] == [
+        f"a.toml:12:1: BP002 error: {'a' * 60}",
+        "    closed-form-of-the-paper",
+        f"    {'b' * 120}",
+    ]
 
 
 def without_colours(text: str) -> str:

@@ -1,8 +1,10 @@
 """The gate over one document: what it finds, where, and in which order."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
+from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -113,6 +115,32 @@ def test_the_circle_is_tested_for_profiles_that_ask_and_when_asked(clean: str, c
     assert check(unstable, circle=False).findings == ()
 
 
+def test_a_circle_that_was_asked_for_and_not_run_is_counted(clean: str, gate: Check) -> None:
+    asks = clean + "\n[circle]\nradius_mm = 1\n"
+    counts = [gate(text, circle=circle).summary.circles_not_run for text in (clean, asks) for circle in (True, False)]
+    assert counts == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("can-motors-8", ["node.execution.grade: an assumption, which carries 98% of the variance"]),
+        (
+            "gantry-24",
+            [
+                f"group.{group}.execution.grade: one of several assumptions, which together carry 100% of the variance "
+                "and 74% of the required time; measure it"
+                for group in ("drives", "tool", "io")
+            ],
+        ),
+    ],
+)
+def test_an_assumption_that_carries_much_is_told_with_its_shares(name: str, words: list[str]) -> None:
+    (file,) = busplan.check(busplan.load_profile(name), circle=False).files
+    found = [one.message for one in file.findings if one.code == "BP112"]
+    assert [message[: len(said)] for message, said in zip(found, words, strict=False)] == words
+
+
 def test_a_margin_that_only_the_default_asks_for_stands_at_the_gain(clean: str, check: Check) -> None:
     little = clean + "\n[circle]\nradius_mm = 25\n[servo]\nstep_us = 100\nposition_gain_per_s = 14000\n"
     (finding,) = check(little).findings
@@ -179,6 +207,11 @@ def test_a_full_slice_has_its_cheapest_cure(
     text = changed(('"optimal"', gap_count), more=f"\n[limits]\nmax_utilisation = {limit}\n")
     (finding,) = [one for one in check(text).findings if one.code == "BP103"]
     assert finding.message.rpartition("cheapest cure: ")[2].startswith(cure)
+    used = {"63": "12.66", '"optimal"': "8.90"}[gap_count]
+    shown = re.match(r"limits\.max_utilisation: ([\d.]+)% of the slice is used, ([\d.]+)% allowed;", finding.message)
+    assert shown is not None
+    assert float(shown[1]) == pytest.approx(float(used), abs=0.06)
+    assert float(shown[2]) == pytest.approx(100 * limit)
 
 
 @pytest.mark.parametrize(("parts", "code"), [(20, "BP002"), (21, "BP001"), (40_000, "BP001")])
@@ -220,6 +253,15 @@ def test_fingerprints_are_unique_and_do_not_move(changed: Changed, gate: Check) 
     assert {one.fingerprint for one in mended} < {one.fingerprint for one in before}
     elsewhere = gate(text, name="b.toml").findings
     assert not {one.fingerprint for one in before} & {one.fingerprint for one in elsewhere}
+
+
+def test_a_fingerprint_is_that_of_earlier_versions(changed: Changed, gate: Check) -> None:
+    """SHA-256 of path, rule, key and number among its equals: by it, services know what they have seen already."""
+    found = gate(changed(('"optimal"', "63  # busplan: ignore[BP111] a # b"), ("nodes = 2", "nodes = 2 # busplan: x")))
+    assert [(one.finding.code, one.finding.key, one.fingerprint) for one in found.findings] == [
+        (code, key, sha256(f"a.toml\0{code}\0{key}\0{number}".encode()).hexdigest())
+        for code, key, number in (("BP110", "bus.gap_count", 0), ("BP902", "", 0), ("BP902", "", 1))
+    ]
 
 
 def test_severities_decide_what_fails(clean: str, changed: Changed, gate: Check) -> None:

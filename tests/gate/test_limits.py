@@ -63,6 +63,10 @@ def test_limits_are_broken_beyond_them_and_not_at_them(codes: Codes) -> None:
         "BP104",
         "BP105",
     }
+    # Each asks for its own.
+    for nodes, axes, code in ((12, 44, "BP104"), (11, 45, "BP105")):
+        more = f"[limits]\nmin_spare_nodes = {nodes}\nmin_spare_axes = {axes}\nmax_utilisation = 0.5\n"
+        assert codes(more=more) & {"BP103", "BP104", "BP105"} == {code}
     # 263.320248 us of 2000 us: 13.166012 %.
     assert "BP103" not in codes(more="[limits]\nmax_utilisation = 0.131661\n")
     assert "BP103" in codes(more="[limits]\nmax_utilisation = 0.131660\n")

@@ -92,5 +92,10 @@ def test_what_cannot_be_compared_is_no_finding(run: Run, tmp_path: Path) -> None
     done = run("check", "press.toml", "--recording", "own.pcapng", "-o", "own.pcapng", cwd=tmp_path)
     assert done.returncode == 2
     assert (tmp_path / "own.pcapng").read_bytes() == CAPTURE.read_bytes()
-    with pytest.raises(busplan.BusplanError, match="needs exactly one profile"):
-        busplan.check(["paper-4ms", "paper-dma"], recording=CAPTURE)
+    # A profile in memory is one, too.
+    car = busplan.load_profile(LOG.parent / "valid.toml")
+    assert busplan.check(car, recording=LOG).findings == ()
+    several: tuple[list[busplan.Profile | str], ...] = (["paper-4ms", "paper-dma"], [car, car], [car, "paper-4ms"])
+    for profiles in several:
+        with pytest.raises(busplan.BusplanError, match="needs exactly one profile"):
+            busplan.check(profiles, recording=CAPTURE)

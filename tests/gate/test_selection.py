@@ -43,6 +43,8 @@ STARTS = st.lists(st.sampled_from([code[:length] for code in CODES for length in
 @example(["BP1"], ["BP1"], "BP110")
 @example(["BP11"], ["BP1"], "BP110")
 @example(["BP1"], ["BP11"], "BP110")
+@example(["BP1", "BP110"], ["BP11"], "BP110")
+@example(["BP11"], ["BP1", "BP110"], "BP110")
 def test_the_longest_beginning_decides_and_ignore_in_a_tie(select: list[str], ignore: list[str], code: str) -> None:
     if code in NEVER_SUPPRESSED:
         expected = True

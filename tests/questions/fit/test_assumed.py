@@ -1,5 +1,7 @@
 """What carries much of a verdict and is assumed: said by the verdict, and by rule BP112."""
 
+from pathlib import Path
+
 import pytest
 
 import busplan
@@ -83,3 +85,44 @@ def test_what_is_known_or_carries_little_is_not_said() -> None:
     light = busplan.load_profile("paper-two-node", changes={"node.execution": small})
     assert (heavy(light), warned(light)) == ({}, [])
     assert warned(busplan.load_profile(light, changes={"node.execution.base_us": 30}))
+
+
+MESSAGE = """\
+schema_version = 1
+name = "car"
+[bus]
+kind = "can"
+bit_rate_kbit_s = 500 # {arbitration}: of this example
+data_bit_rate_kbit_s = 2000 # {data}: of this example
+[[message]]
+name = "m"
+identifier = 1
+payload_bytes = 32
+fd = true
+brs = true
+period_us = 10000
+"""
+# Of 244 us at most, 177 us are sent at the higher rate.
+OF_DATA, OF_ARBITRATION = "carries 73% of the load", "carries 27% of the load"
+
+
+@pytest.mark.parametrize(
+    ("arbitration", "data", "carries"),
+    [
+        ("published", "published", {}),
+        ("published", "assumed", {("bus.data_bit_rate_kbit_s",): OF_DATA}),
+        ("assumed", "published", {("bus.bit_rate_kbit_s",): OF_ARBITRATION}),
+        (
+            "assumed",
+            "assumed",
+            {("bus.bit_rate_kbit_s",): OF_ARBITRATION, ("bus.data_bit_rate_kbit_s",): OF_DATA},
+        ),
+    ],
+)
+def test_of_messages_alone_an_assumed_rate_carries_the_load_that_goes_without_it(
+    arbitration: str, data: str, carries: dict[tuple[str, ...], str], tmp_path: Path
+) -> None:
+    file = tmp_path / "car.toml"
+    file.write_text(MESSAGE.format(arbitration=arbitration, data=data))
+    assert heavy(busplan.load_profile(file)) == carries
+    assert len(warned(busplan.load_profile(file))) == len(carries)

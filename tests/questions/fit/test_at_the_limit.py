@@ -59,3 +59,17 @@ def test_a_load_at_its_limit_allows_for_rounding_and_no_more() -> None:
         limited = busplan.load_profile(profile, changes={"limits": {"max_load": most}})
         (figures,) = busplan.capacity(limited, timing_model="worst-stuffing").results
         assert ("load" in figures.exceeded) == is_broken
+
+
+def test_what_cannot_be_right_allows_for_rounding_and_no_more() -> None:
+    profile = busplan.load_profile("paper-1ms", changes={"cycle.slice_ratio": 1.0})
+    now = busplan.capacity(profile).verdicts[0].deciding
+    assert now.bias_us is not None
+    assert now.uncertainty_us is not None
+    least_us = now.required_us + now.bias_us - now.uncertainty_us
+    for period_us, verdict in (
+        (least_us * (1 + 2e-13), "not shown to fit"),
+        (least_us * (1 - 2e-13), "not shown to fit"),
+        (least_us * (1 - 3e-11), "does not fit"),
+    ):
+        assert busplan.capacity(profile, period_us=period_us).verdict == verdict

@@ -16,7 +16,14 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.figure import by_key
 from busplan.elementwise import Traced
 from busplan.profile.kinds import cycle_keys
-from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
+from busplan.questions.fit.certainty import (
+    FITS,
+    certainty,
+    deciding_cycle,
+    is_shown_to_fit,
+    limits_to_be_safe,
+    limits_with_time,
+)
 from busplan.questions.fit.figures import cycle_figures, figures, node_counts
 from busplan.questions.fit.network import changed, model_names, network_of
 from tests.registers import at_least, shipped_names
@@ -178,7 +185,9 @@ def test_the_safe_nodes_are_safe_and_one_more_is_not(
     network = network_of(data.draw(profiles_by_kind[kind]))
 
     def is_safe(nodes: int) -> bool:
-        then = figures(changed(network, {"bus.nodes": nodes}), model=network.bus.deciding_model)
+        with_nodes = changed(network, {"bus.nodes": nodes})
+        then = figures(with_nodes, model=network.bus.deciding_model)
+        assert is_shown_to_fit(with_nodes) == (then.verdict == FITS)
         return then.verdict == FITS and then.safe
 
     (count,) = node_counts(network, model=network.bus.deciding_model)

@@ -10,6 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
+from busplan.questions.fit.figures import after_reset
+from busplan.questions.fit.figures import figures as figures_of
+from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
 from tests.oracles.ieee1394_cycle import carries_broadcasts, exact_cycle_start_us, exact_required_us
 from tests.registers import at_least, some
@@ -268,3 +271,36 @@ def test_figures_of_another_kind_are_refused() -> None:
     (result, *_) = busplan.capacity("paper-4ms").results
     with pytest.raises(busplan.BusplanError, match="the figures are Ieee1394Figures, not CanFigures"):
         busplan.CanFigures.of(result)
+
+
+@pytest.mark.parametrize(("adapter", "adapter_us"), [("none", 0), ("ftdi-low-latency", 2000), ("ftdi", 17_000)])
+def test_what_is_needed_at_least_is_needed_without_what_is_only_possible(adapter: str, adapter_us: float) -> None:
+    # 14 answers, two requests and the host; an adapter keeps what it has read for up to its timer, or sends it at once.
+    profile = busplan.load_profile("dynamixel-arm-14", changes={"bus.adapter": adapter, "cycle.period_us": 5500})
+    figures = busplan.capacity(profile).verdicts[0].deciding
+    assert (figures.least_required_us, figures.required_us) == (5368.0, 5368.0 + adapter_us)
+    # 323 us of doubt are more than the 132 us left. What is only possible does not make a cycle too long for certain.
+    assert figures.verdict == "not shown to fit"
+    assert figures.exceeded == (("time",) if adapter_us else ())
+
+
+@pytest.mark.parametrize(
+    ("period_us", "gap_count", "then"),
+    [
+        # At gap count 63 a slice of 264.109 us is shown to be enough, and 255.497 us is the least that may be.
+        (510.9, "optimal", "does not fit"),
+        (511.1, "optimal", "not shown to fit"),
+        (528.2, "optimal", "not shown to fit"),
+        (528.3, "optimal", None),
+        # A plan that is not shown to fit now, or that is as after a reset already, says nothing of one.
+        (400.0, "optimal", None),
+        (4000.0, 63, None),
+    ],
+)
+def test_a_reset_is_told_where_the_cycle_fits_before_it_and_not_after_it(
+    period_us: float, gap_count: object, then: str | None, make: Make
+) -> None:
+    bus = {"bus__gap_count": gap_count, "bus__cycle_master": False}
+    network = network_of(make(**bus, cycle__period_us=period_us, node__execution__grade="measured"))
+    after = after_reset(network, figures_of(network, model="standard"))
+    assert (None if after is None else after.verdict) == then

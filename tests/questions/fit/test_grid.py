@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from itertools import product
+from math import prod
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,6 +13,9 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_names
 from busplan.forms.blocks import Card
+from busplan.questions.fit.figures import capacity_figures, figures
+from busplan.questions.fit.grid import Grid, capacities, fits_at, points_of, require_few_tables
+from busplan.questions.fit.network import model_names, network_of
 from tests.registers import at_least
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
@@ -63,3 +68,81 @@ def test_map_sweep_and_explore_say_of_each_setting_what_capacity_says(
             if cell.state == "fits":
                 assert verdict.deciding.verdict == "fits"
                 assert verdict.deciding.safe
+
+
+# --- the engine itself, on a few points ---------------------------------------------------------------------------
+
+GRIDS: dict[str, dict[str, list[object]]] = {
+    # A word, a number and the nodes: points of a word stand in an array.
+    # And one of two timing models cannot express a retry.
+    "paper-1ms": {"bus.gap_count": [63, "optimal"], "cycle.retries": [0, 2], "bus.nodes": [1, 9]},
+    "sercos3-servo-8": {"bus.version": ["V1.0", "V1.1"], "cycle.period_us": [250, 500], "bus.nodes": [3, 60]},
+    # Responses are searched, point by point.
+    "can-servo-8": {"bus.nodes": [3, 8]},
+}
+
+
+def grid_of(axes: Mapping[str, list[object]]) -> Grid:
+    return Grid({key: np.array(values, dtype=object) for key, values in axes.items()})
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_each_point_has_the_figures_of_its_network_alone(name: str) -> None:
+    network = network_of(busplan.load_profile(name))
+    grid = grid_of(GRIDS[name])
+    possible, refused = points_of(network, grid)
+    assert refused == {}
+    assert [point.changes for point in possible.values()] == [*grid.each_point()]
+    points = [*possible.values()]
+    together = capacities(network, points)
+    decided = fits_at(points, model=network.bus.deciding_model)
+    for point, found, fit in zip(points, together, decided, strict=True):
+        alone = network_of(busplan.load_profile(name, changes=point.changes))
+        assert [of_model.timing_model for of_model in found] == [*model_names(alone)]
+        for of_model in found:
+            assert of_model.values() == capacity_figures(alone, model=of_model.timing_model).values()
+        assert fit.values() == figures(alone, model=network.bus.deciding_model).values()
+
+
+def test_axes_are_those_of_whole_nodes_beside_the_others() -> None:
+    """Drives of five axes each, beside the tool, which has four, or five as well."""
+    network = network_of(busplan.load_profile("gantry-24"))
+    possible, refused = points_of(network, grid_of({"axes": [4, 9, 10, 14, 15.5], "group.tool.axes": [4, 5]}))
+    found = {
+        (point.changes["group.tool.axes"], point.network.axes): point.changes["group.drives.nodes"]
+        for point in possible.values()
+    }
+    assert found == {(4, 9): 1, (4, 14): 2, (5, 10): 1}
+    assert refused[0] == "axes = 4: no whole number of nodes, with 5 axes each beside 4 others"
+    assert refused[3] == "axes = 9: no whole number of nodes, with 5 axes each beside 5 others"
+    assert sorted({*possible, *refused}) == [*range(10)]
+    assert len(refused) == 7
+    _, alike = points_of(network_of(busplan.load_profile("paper-1ms")), grid_of({"axes": [0, 4, 6, 8]}))
+    assert alike == {
+        place: f"axes = {axes}: no whole number of nodes, with 4 axes each" for place, axes in ((0, 0), (2, 6))
+    }
+
+
+@given(sizes=st.lists(st.integers(1, 5), min_size=1, max_size=4), most=st.integers(1, 40))
+def test_chunks_are_the_grid_in_its_order_and_no_larger_than_asked(sizes: list[int], most: int) -> None:
+    grid = Grid({str(place): np.arange(size) for place, size in enumerate(sizes)})
+    rows: list[dict[str, object]] = []
+    for chunk in grid.chunks(most):
+        assert 1 <= prod(chunk.shape) <= most
+        columns = [np.broadcast_to(values, chunk.shape).ravel().tolist() for values in chunk.values.values()]
+        rows += (dict(zip(chunk.values, row, strict=True)) for row in zip(*columns, strict=True))
+    assert rows == [*grid.each_point()]
+    assert grid.points == len(rows) == prod(sizes)
+
+
+def test_settings_of_many_groups_are_refused_with_how_many_there_may_be() -> None:
+    network = network_of(busplan.load_profile("gantry-24"))  # three groups
+    require_few_tables(network, settings=10, most=30)
+    with pytest.raises(busplan.BusplanError) as caught:
+        require_few_tables(network, settings=1100, most=3000)
+    said = "1,100 settings of 3 groups and messages take too long: give values for up to 1,000 settings"
+    assert caught.value.problems == (said,)
+    # Drives that are alike are one table, and each of three messages is another.
+    require_few_tables(network_of(busplan.load_profile("can-servo-8")), settings=10, most=40)
+    with pytest.raises(busplan.BusplanError, match="10 settings of 4 groups and messages"):
+        require_few_tables(network_of(busplan.load_profile("can-servo-8")), settings=10, most=39)

@@ -429,5 +429,9 @@ def test_a_network_of_messages_has_neither_nodes_nor_axes() -> None:
     message = {"name": "m", "identifier": 1, "payload_bytes": 8, "period_us": 10_000}
     bus = {"kind": "can", "bit_rate_kbit_s": 500}
     data = {"schema_version": 1, "name": "messages", "bus": bus, "message": [message]}
-    alone = busplan.capacity(kind_named("can").profile_model().model_validate(data)).verdicts[0].figures
+    verdict = busplan.capacity(kind_named("can").profile_model().model_validate(data)).verdicts[0]
+    alone = verdict.figures
+    assert verdict.cycle is None
+    with pytest.raises(BusplanError, match="a network of messages alone has no cycle"):
+        _ = verdict.deciding
     assert (alone.nodes, alone.axes, hasattr(alone, "most_axes")) == (0, 0, False)

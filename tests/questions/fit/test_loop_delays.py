@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses import kind_named
 from busplan.questions.fit.circle_setup import loop_delays_us
 from busplan.questions.fit.network import network_of
 from tests.oracles.random_plans import fitting
@@ -47,3 +48,38 @@ def test_the_circle_has_the_delay_of_the_loop(seed: int, kind: str, tmp_path: Pa
     else:
         # The loop also has groups that are not the last, and the late bits of CAN FD.
         assert delay_us <= longest_us + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "apart_us"),
+    [
+        # Seven frames of 135 us. The adapter's time is in the loop, and in no cycle.
+        ("can-servo-8", {"bus.host_write_us": 100.0, "bus.host_read_us": 150.0}, 7 * 135),
+        ("ethercat-servo-8", {"bus.sync_shift": 0.3}, 4.957),
+    ],
+)
+@pytest.mark.parametrize("update", ["next_sync", "on_arrival"])
+def test_the_last_axis_has_the_delay_of_the_loop_and_the_first_a_shorter_one(
+    name: str, more: dict[str, object], apart_us: float, update: str
+) -> None:
+    profile = busplan.load_profile(name, changes={"servo.loop": "host", "servo.update": update, **more})
+    first_us, last_us = loop_delays_us(network_of(profile))
+    assert last_us == pytest.approx(loop_us(profile))
+    assert last_us - first_us == pytest.approx(apart_us if update == "on_arrival" else 0)
+
+
+def test_the_axes_of_a_loop_on_the_host_are_on_nodes_with_feedback_and_commands() -> None:
+    """Of three groups of two, the first has no commands and the last no axes: x and y are next to each other."""
+    data = busplan.load_profile("ethercat-servo-8", changes={"servo.loop": "host"}).model_dump(exclude_unset=True)
+    node, payload, _ = data.pop("node"), data.pop("payload"), data["bus"].pop("nodes")
+    own: tuple[dict[str, object], ...] = ({"write_bytes": 0}, {}, {"axes": 0})
+    data["group"] = [{**node, **payload, "nodes": 2, "name": name, **one} for name, one in zip("abc", own, strict=True)]
+    data["servo"]["update"] = "on_arrival"
+    network = network_of(kind_named("ethercat").profile_model().model_validate(data))
+    first_us, last_us = loop_delays_us(network)
+    # 4.957 us from the first to the last of eight.
+    assert last_us - first_us == pytest.approx(4.957 / 7, abs=1e-3)
+    # The drives of a, with axes and without commands, and those of c have their frame earlier and later.
+    cycle = network.bus.cycle(network, model="last-byte")
+    assert last_us - cycle.arrival_us(4) == pytest.approx(first_us - cycle.arrival_us(3))
+    assert cycle.arrival_us(1) < cycle.arrival_us(3) < cycle.arrival_us(6)

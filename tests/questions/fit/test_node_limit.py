@@ -1,6 +1,7 @@
 """The most nodes within some limits: against a count, and over arrays."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ import busplan
 from busplan.buses.limits import ExactLimit, Held
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, rounded_up
-from busplan.questions.fit.most_nodes import most_nodes
+from busplan.questions.fit.certainty import limits_with_time
+from busplan.questions.fit.figures import node_counts
+from busplan.questions.fit.most_nodes import most_nodes, safe_nodes
 from busplan.questions.fit.network import network_of
 
 NETWORK = network_of(busplan.load_profile("paper-4ms"))
@@ -109,3 +112,18 @@ def test_of_many_groups_the_most_nodes_of_each_fit_and_one_more_does_not(kind: s
             answer = busplan.capacity(busplan.load_profile(path, changes={key: nodes}))
             now = answer.verdicts[0].deciding
             assert (now.fits, now.verdict == "fits" and now.safe) == (fits, is_shown)
+
+
+def test_the_counts_of_many_groups_at_once_are_those_of_each_alone(tmp_path: Path) -> None:
+    """From sixteen groups on they are points of an array; some of them are alike, and so one in the cycle."""
+    path = tmp_path / "many.toml"
+    path.write_text(groups_of("ieee1394", 18).replace("read_bytes = 5", "read_bytes = 4"))
+    network = network_of(busplan.load_profile(path))
+    assert len(network.groups) < len(network.profile.node_groups) == 18
+    limits = limits_with_time(network, model="standard")
+    found = node_counts(network, model="standard")
+    for count in found[::6]:
+        most = most_nodes(partial(network.with_nodes, group=count.name), limits)
+        assert (count.max_nodes, count.limited_by) == most.words
+        assert (count.safe_nodes, count.safe_limited_by) == safe_nodes(network, group=count.name)
+    assert len({count.max_nodes for count in found}) > 1

@@ -130,6 +130,94 @@ def test_the_least_change_that_is_enough_is_taken(name: str, data: st.DataObject
         assert errors_of(changed(profile, change))
 
 
+ETHERCAT: dict[str, Any] = {"payload.read_bytes": 400, "payload.write_bytes": 700, "cycle.period_us": 700}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "free", "planned", "less"),
+    [
+        # A slice of 237.4 us: in 400 us a share of 0.594, and a period of 474.8 us at the profile's half.
+        ("", {"cycle.period_us": 400.0}, "slice_ratio", {"cycle.slice_ratio": 0.6}, {"cycle.slice_ratio": 0.59}),
+        # Of two that ask for more the larger counts: 192.04 us are to be 70 % of the slice at most.
+        (
+            "",
+            {"cycle.period_us": 400.0, "limits.max_utilisation": 0.7},
+            "slice_ratio",
+            {"cycle.slice_ratio": 0.69},
+            {"cycle.slice_ratio": 0.68},
+        ),
+        ("", {"cycle.period_us": 400.0}, "period", {"cycle.period_us": 475.0}, {"cycle.period_us": 474.0}),
+        ("", {"cycle.period_us": 2000.0, "bus.nodes": 9}, "nodes", {"bus.nodes": 7}, {"bus.nodes": 8}),
+        # Quadlets of the larger payload alone, and of both; single bytes.
+        (
+            "",
+            {"cycle.period_us": 800.0, "payload.write_bytes": 600},
+            "payload",
+            {"payload.write_bytes": 180},
+            {"payload.write_bytes": 184},
+        ),
+        (
+            "",
+            {"cycle.period_us": 800.0, "payload.write_bytes": 700, "payload.read_bytes": 500},
+            "payload",
+            {"payload.read_bytes": 96, "payload.write_bytes": 96},
+            {"payload.read_bytes": 100, "payload.write_bytes": 100},
+        ),
+        (
+            "ethercat-servo-8",
+            {**ETHERCAT, "bus.sync_shift": 0.7},
+            "payload",
+            {"payload.read_bytes": 123, "payload.write_bytes": 123},
+            {"payload.read_bytes": 124, "payload.write_bytes": 124},
+        ),
+        (
+            "dynamixel-arm-14",
+            {"payload.read_bytes": 60, "payload.write_bytes": 40},
+            "payload",
+            {"payload.read_bytes": 11, "payload.write_bytes": 11},
+            {"payload.read_bytes": 12, "payload.write_bytes": 12},
+        ),
+        # The setting is safe for four nodes more, as many as [limits] asks for: ten hops, not six.
+        (
+            "",
+            {"cycle.period_us": 3200.0, "bus.nodes": 6, "bus.gap_count": 63, "limits.min_spare_nodes": 4},
+            "gap_count",
+            {"bus.gap_count": 26},
+            {"bus.gap_count": 25},
+        ),
+    ],
+)
+def test_each_thing_is_changed_by_as_little_as_is_enough(
+    name: str,
+    changes: dict[str, Any],
+    free: str,
+    planned: dict[str, Any],
+    less: dict[str, Any],
+    make: Make,
+) -> None:
+    profile = changed(busplan.load_profile(name) if name else make(bus__gap_count="optimal"), changes)
+    assert errors_of(profile)
+    assert changes_of(profile, [free]) == planned
+    assert errors_of(changed(profile, planned)) == []
+    assert errors_of(changed(profile, less))
+
+
+def test_a_payload_is_cut_by_axes_where_it_is_given_so() -> None:
+    """Down to a byte of each axis, and the period does the rest."""
+    read, write = "group.{}.read_bytes_per_axis", "group.{}.write_bytes_per_axis"
+    # What was given a value stays, whatever it costs.
+    asked = {"group.drives.nodes": 9, write.format("drives"): 7}
+    found = busplan.plan("gantry-24", changes=asked, free=["payload", "period"]).recommended_changes
+    assert found is not None
+    assert {key: found[key] for key in found if key != "cycle.period_us"} == {
+        **asked,
+        read.format("drives"): 1,
+        # 4 bytes of the probe are read beside those of four axes: 8 bytes are left of each payload.
+        read.format("tool"): 1,
+        write.format("tool"): 2,
+    }
+
+
 def test_two_things_are_changed_where_no_single_one_is_enough(make: Make) -> None:
     # The slice must give 370.1 us at gap count 63 and 237.4 us at 7; of 300 us, 0.9 is 270 us.
     profile = make(cycle__period_us=300.0)
@@ -270,6 +358,14 @@ def test_a_row_that_changes_nothing_is_a_word_below_the_table() -> None:
 def test_what_was_asked_for_is_named_where_nothing_else_changes() -> None:
     said = str(busplan.plan("paper-4ms", nodes=3)).splitlines()[0]
     assert "(12 axes) at 4 ms: bus.nodes = 3 is all that changes; it fits with a corrected margin of " in said
+
+
+@pytest.mark.parametrize(
+    ("axes", "wanted"), [(8, {}), (9, {"bus.nodes": 3}), (12, {"bus.nodes": 3}), (3, {"bus.nodes": 1})]
+)
+def test_axes_are_on_as_many_nodes_as_it_takes(axes: int, wanted: dict[str, int]) -> None:
+    # Four on each; there are two nodes.
+    assert busplan.plan("paper-4ms", axes=axes).wanted == wanted
 
 
 def test_a_change_of_a_group_has_the_meaning_of_the_key() -> None:

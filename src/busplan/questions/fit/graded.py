@@ -56,8 +56,9 @@ def given(profile: Profile, key: str) -> Input:
     value = getattr(section, name)
     bus = bus_of(profile)
     # A default of zero and a word that selects a formula are not measured: a grade beside them does not apply.
-    is_no_measurement = (not is_set and not value) or _selects_formula(profile, key)
-    grade = "given" if own_grade is None or is_no_measurement else own_grade
+    if (not is_set and not value) or _selects_formula(profile, key):
+        own_grade, graded_by = None, ""
+    grade = own_grade or "given"
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     common_key, group = _common_key(profile, key)
     bus_key = bus.keys.get(common_key, Key())
