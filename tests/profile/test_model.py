@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import busplan
-from busplan.profile.kinds import words_of
+from busplan.profile.kinds import cycle_keys, default_of, dotted_keys, profile_schema, words_of
 
 TEXT = """\
 schema_version = 1
@@ -235,6 +235,78 @@ def test_every_default_is_a_value_that_the_schema_takes() -> None:
     whole = loaded.model_dump()
     sections = ("bus", "cycle", "payload", "node", "servo", "mechanics", "delivery", "circle", "tolerance", "limits")
     assert busplan.load_profile(loaded, changes={name: whole[name] for name in sections}) == loaded
+
+
+SHIPPED = ("gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
+MESSAGES = """\
+schema_version = 1
+name = "alone"
+bus = {kind = "can", bit_rate_kbit_s = 500}
+[[message]]
+name = "a"
+identifier = 0x181
+payload_bytes = 2
+period_us = 1000
+"""
+
+
+def defaults_in(schema: dict[str, Any], node: dict[str, Any], parts: list[str]) -> list[object]:
+    """Defaults of a key in a JSON Schema, one for each table that may have it."""
+    places = [node]
+    for part in parts:
+        found = []
+        while places:
+            place = places.pop()
+            if "$ref" in place:
+                places.append(schema["$defs"][place["$ref"].rpartition("/")[2]])
+            places += place.get("anyOf", []) + place.get("oneOf", [])
+            if part in place.get("properties", {}):
+                found.append(place["properties"][part])
+        places = found
+    return [place.get("default") for place in places]
+
+
+def test_the_schema_has_defaults_and_titles_of_the_model() -> None:
+    schema = profile_schema()
+    of_kinds = {
+        choice["if"]["properties"]["bus"]["properties"]["kind"]["const"]: choice["then"] for choice in schema["allOf"]
+    }
+    for name in SHIPPED:
+        loaded = busplan.load_profile(name)
+        keys = {key: entry.value for key, entry in dotted_keys(loaded).items() if entry.source == "default"}
+        assert len(keys) > 10
+        for key, value in keys.items():
+            assert default_of(loaded, key) == (list(value) if isinstance(value, tuple) else value)
+            if value is not None and not key.startswith(("group", "message")):
+                assert value in defaults_in(schema, of_kinds[loaded.bus.kind], key.split(".")), key
+        for key in ("schema_version", "cycle.period_us", "bus.kind", "cycle.period_us.x", "nothing.at_all"):
+            assert default_of(loaded, key) is None
+    titles = {name: part["title"] for name, part in schema["$defs"].items() if name.endswith(("Group", "Section"))}
+    assert [name for name, title in titles.items() if title not in name] == []
+    assert titles["EthercatGroup"] == titles["GroupSection"] == "Group"
+    assert titles["Ieee1394CycleSection"] == "Cycle"
+
+
+def test_a_cycle_depends_on_keys_of_its_own_and_on_those_of_the_verdict(tmp_path: Path) -> None:
+    alike, in_groups = (set(cycle_keys(busplan.load_profile(name))) for name in ("paper-4ms", "gantry-24"))
+    verdict = {"limits.reserve", "limits.missed_cycles"}
+    assert alike >= {"bus.nodes", "cycle.period_us", "node.axes", "payload.read_bytes", "host.transaction_us", *verdict}
+    assert in_groups >= {"bus.speed", "group.io.nodes", "group.drives.execution.base_us", *verdict}
+    assert not any(key.startswith(("bus.nodes", "node.", "payload.")) for key in in_groups)
+    never = ("servo.", "circle.", "tolerance.", "delivery.", "mechanics.", "name", "description", "schema_version")
+    for keys in (alike, in_groups):
+        assert not any(key.startswith(never) or key.endswith((".name", ".kind")) for key in keys)
+        assert {key for key in keys if key.startswith("limits.")} == verdict
+    # A kind of bus may have limits that its cycle depends on.
+    of_can = set(cycle_keys(busplan.load_profile("can-servo-8")))
+    assert {key for key in of_can if key.startswith("limits.")} == {"limits.max_load", *verdict}
+    (tmp_path / "alone.toml").write_text(MESSAGES)
+    alone = busplan.load_profile(tmp_path / "alone.toml")
+    assert cycle_keys(alone)
+    left = of_can - set(cycle_keys(alone))
+    assert left >= {"cycle.period_us", "node.axes", "payload.read_bytes", "bus.nodes", *verdict}
+    assert not any(key.startswith(("cycle.", "node.", "payload.", "bus.nodes")) for key in cycle_keys(alone))
+    assert not any(key.startswith(("cycle.", "node.", "payload.")) for key in dotted_keys(alone))
 
 
 # --- the bus ----------------------------------------------------------------------------------------------

@@ -265,8 +265,6 @@ def words_of(profile: Profile, key: str) -> tuple[str, ...]:
 
 def _are_several(annotation: Any) -> bool:
     """Whether a key has several tables."""
-    if get_origin(annotation) is Annotated:
-        return _are_several(get_args(annotation)[0])
     return get_origin(annotation) is tuple
 
 
