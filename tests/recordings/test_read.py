@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from busplan.errors import BusplanError
+from busplan.recordings import written
 from busplan.recordings.can import CanFrames, read_can
+from busplan.recordings.can_bits import written_bits
 from busplan.recordings.capture import CaptureNotes, packets
 from busplan.recordings.ethercat import Datagram, EthercatFrames, read_ethercat
 from tests.oracles.can_recording import Queued, bits_of
@@ -126,9 +128,9 @@ SHORT = b"\0" * 7
 def captured(form: Callable[..., bytes], **options: Any) -> bytes:
     """The log's frames of can0 as a capture, whose fourth packet is an error frame and whose first is no frame."""
     content = [(0.0, SHORT), *((row[0], packet_of(row)) for row in ROWS), (400.0, ERROR)]
-    written = form(sorted(content), **options)
-    at = 20 if form is pcap else written.index(struct.pack("<I", 65535)) - 4
-    return written[:at] + struct.pack("<H", 227) + written[at + 2 :]
+    whole = form(sorted(content), **options)
+    at = 20 if form is pcap else whole.index(struct.pack("<I", 65535)) - 4
+    return whole[:at] + struct.pack("<H", 227) + whole[at + 2 :]
 
 
 @pytest.mark.parametrize("form", [pcap, pcapng])
@@ -158,6 +160,7 @@ def test_a_capture_of_socketcan_that_is_cut_or_drops_says_so(tmp_path: Path) -> 
     [
         (LOG, None, "has frames of 2 channels: can0 (8 frames), can1 (1 frame); --channel NAME reads one"),
         (LOG, "can2", "channel can2: no such channel; there are can1, can0"),
+        (LOG, "x" * 40, f"channel {'x' * 40}: no such channel; there are can1, can0"),
         (LOG, "x" * 41, f"channel {'x' * 40}...: no such channel; there are can1, can0"),
         ("(1.0) can0 20000088#\n" * 2, None, "has no CAN frame but 2 error frames"),
         ("# nothing\n", None, "has no CAN frame"),
@@ -206,6 +209,19 @@ def test_channels_are_counted_up_to_a_bound(tmp_path: Path) -> None:
     assert of_file(log(257), tmp_path, channel="can9").broken == "over 256 channels"
 
 
+def test_a_classical_frame_has_8_bytes_whatever_more_its_length_code_says(tmp_path: Path) -> None:
+    """ISO 11898-1: codes 9 to 15 mean 8 bytes, and stand on the wire as they are."""
+    head = "date Sam Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\ninternal events logged\n"
+    codes, data = [*range(8, 16)], 0x0011223344556677
+    lines = [f"{code / 100:.6f} 1  181  Rx   d {code:X} {data.to_bytes(8, 'big').hex(' ')}\n" for code in codes]
+    frames = of_file(head + "".join(lines), tmp_path, name="bus.asc")
+    assert frames.sizes.tolist() == [8] * 8
+    alike = np.zeros(8, dtype=bool)
+    expected = written_bits(np.full(8, 0x181), alike, alike, np.array(codes), np.full(8, data, dtype=np.uint64))
+    assert frames.bits.tolist() == expected.tolist()
+    assert len({*expected.tolist()}) > 1
+
+
 @pytest.fixture(scope="module")
 def blf(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
     """A BLF of ten frames, by python-can: its head, and the data of its container."""
@@ -247,15 +263,18 @@ def test_objects_of_a_blf_are_read_up_to_the_first_that_cannot_be_one(blf: tuple
         (object_of(10, b"", size=15), broken),
         (object_of(65, b"", size=16_000_001), "an object of over 16,000,000 bytes"),
         (container(1, data), "a container that is compressed by method 1"),
-        (container(2, zlib.compress(bytes(16_000_001))), "a container of over 16,000,000 bytes"),
     ):
         assert read(plain, damaged, plain) == (10, why)
     assert read(plain, object_of(10, b"", size=16)[:16], plain)[1].startswith("error: unpack_from requires")
+    # An object that goes on from one container to the next is held, up to 16 MB.
+    begun = container(2, zlib.compress(struct.pack("<4sHHII", b"LOBJ", 16, 1, 2**32 - 256, 1) + bytes(10**7 - 16), 1))
+    for size, why in ((6 * 10**6, ""), (6 * 10**6 + 1, "a container of over 16,000,000 bytes")):
+        assert read(plain, begun, container(2, zlib.compress(bytes(size), 1))) == (10, why)
 
 
 # --- EtherCAT ---------------------------------------------------------------------------------------------
 
-SENT = ((LRW, 0x10000, 6), (FRMW, 0x1300000, 8))
+SENT = ((LRW, 0x10203040, 1400), (FRMW, 0x1300000, 8))
 
 
 def of_capture(frames: list[tuple[float, bytes]], folder: Path) -> EthercatFrames:
@@ -278,8 +297,8 @@ def test_a_capture_has_each_field_of_each_frame(tmp_path: Path) -> None:
     assert found.numbers.tolist() == [1, 2, 4, 5, 6, 8]
     assert found.returned.tolist() == [False, True, False, True, True, False]
     assert [found.layouts[number] for number in found.layout.tolist()] == [
-        *[(Datagram(LRW, 0x10000, 6), Datagram(FRMW, 0, 8))] * 5,
-        (Datagram(LRW, 0x10000, 6),),
+        *[(Datagram(LRW, 0x10203040, 1400), Datagram(FRMW, 0, 8))] * 5,
+        (Datagram(LRW, 0x10203040, 1400),),
     ]
     assert [datagram.is_logical for datagram in found.layouts[found.layout[0]]] == [True, False]
     # A frame returns with its key, and only its index tells it from the next one.
@@ -291,6 +310,20 @@ def test_a_capture_has_each_field_of_each_frame(tmp_path: Path) -> None:
     assert (found.others, found.cut, found.latches, found.unlatched) == (1, 1, (), 0)
     of_one = found.events(np.array([5.0]), np.array([3]))
     assert (of_one.values.tolist(), of_one.times_s.tolist(), of_one.frames.tolist()) == ([5], [40e-6], [5])
+
+
+def test_frames_that_cannot_be_told_apart_are_refused(tmp_path: Path) -> None:
+    own = [(float(place), ethernet(SENT, index=place, counters=(0, 0))) for place in range(3)]
+    local = [(us, packet[:6] + b"\x02" + packet[7:]) for us, packet in own]
+    with pytest.raises(BusplanError, match=r"all frames have a source address with the bit 0x02 of its first byte"):
+        of_capture(local, tmp_path)
+    others = [(us + 0.5, packet[:11] + b"\x99" + packet[12:]) for us, packet in own[:1]]
+    masters = r"2 masters: 00:11:22:33:44:55 \(3 frames\), 00:11:22:33:44:99 \(1 frame\); keep the frames of one"
+    with pytest.raises(BusplanError, match=masters):
+        of_capture(sorted(own + others), tmp_path)
+    cut = [(us, packet[:-1]) for us, packet in own]
+    with pytest.raises(BusplanError, match=r"type 0x88A4\) among 4 Ethernet packets, 3 of them cut: record whole"):
+        of_capture([*cut, (9.0, bytes(60))], tmp_path)
 
 
 def test_port_times_are_those_behind_the_last_write_that_latches_them(tmp_path: Path) -> None:
@@ -345,7 +378,8 @@ def test_each_interface_has_its_ticks_and_its_offset(tmp_path: Path) -> None:
     }
     offsets_s = (0, 0, 5, -3, 0)
     comment = "synthetic: of a test" + "." * 300
-    content = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + option(1, comment.encode()))
+    words = option(1, comment.encode()) + option(2, b"synthetic: hardware") + option(1, b"a comment")
+    content = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + words)
     for options in interfaces:
         content += block(1, struct.pack("<HHI", 1, 0, 0) + b"".join(option(*one) for one in options))
     content += block(0xBAD, b"a custom block")
@@ -388,3 +422,18 @@ def test_a_block_that_cannot_be_one_ends_a_capture_where_it_begins(damage: bytes
     pieces = list(packets(path, notes, progress=nobody))
     assert sum(len(piece.starts) for piece in pieces) == (2 if used else 4)
     assert notes.broken_at == (len(whole) if used else None)
+
+
+def test_what_is_written_is_what_the_formats_say() -> None:
+    """Blocks of the draft on pcapng, each written by hand."""
+    content = written.pcapng([(5 * 2**32 + 7, b"seven b"), (2**63, b"four")], link=227, origin="a test")
+    assert content == b"".join(
+        (
+            block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + option(1, b"synthetic: a test") + bytes(4)),
+            block(1, struct.pack("<HHI", 227, 0, 65535) + option(2, b"synthetic") + option(9, b"\x09") + bytes(4)),
+            block(6, struct.pack("<IIIII", 0, 5, 7, 7, 7) + b"seven b"),
+            block(6, struct.pack("<IIIII", 0, 2**31, 0, 4, 4) + b"four"),
+        )
+    )
+    lines = [(1_700_000_000_000_001, "181#00"), (999_999, "7FF#")]
+    assert written.candump(lines) == b"(1700000000.000001) synthetic 181#00\n(0000000000.999999) synthetic 7FF#\n"

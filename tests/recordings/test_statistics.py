@@ -5,7 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.recordings.statistics import lateness, line, periodic_events, quantile
+from busplan.recordings.statistics import (
+    Events,
+    ahead,
+    expanded,
+    lateness,
+    line,
+    periodic_events,
+    policed,
+    quantile,
+    steady_rate,
+    step,
+)
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200), st.floats(0.5, 1))
@@ -117,3 +128,84 @@ def test_the_line_of_medians_is_numpys_weighted_fit() -> None:
     # Fewer than ten values of a size show no median, and one size no line.
     assert line(np.append(sizes, [160.0] * 9), np.append(values, [1e6] * 9), 0.3) == found
     assert line(sizes[:15], values[:15], 0.3) is None
+    # Two sizes lie on their line: nothing enlarges its uncertainty.
+    slope, uncertainty = line(sizes[:30], values[:30], 0.3) or (0.0, 0.0)
+    assert slope == pytest.approx((medians[1] - medians[0]) / 10)
+    assert uncertainty == pytest.approx(np.hypot(*errors[:2]) / 10)
+
+
+def test_too_few_events_or_all_at_once_have_no_period() -> None:
+    assert periodic_events(np.arange(9) * 100.0) is None
+    assert periodic_events(np.zeros(20)) is None
+    found = periodic_events(np.arange(10) * 100.0)
+    assert found is not None
+    assert (found.period_us, found.missing, found.places.tolist()) == (pytest.approx(100), 0, [*range(10)])
+    # Of two behind each other, and of three.
+    places = np.array([0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 14, 15])
+    found = periodic_events(places * 100.0)
+    assert found is not None
+    assert (found.missing, [part.tolist() for part in found.gaps]) == (4, [[2, 9], [1, 3]])
+    # Where half of the events are missing, an estimate tells the period.
+    assert [
+        found and (found.missing, round(found.period_us))
+        for found in (periodic_events(np.arange(0, 40, 2) * 100.0, near_us) for near_us in (None, 100.0))
+    ] == [(0, 200), (19, 100)]
+
+
+def test_the_earliest_event_is_the_first_frame_of_its_time() -> None:
+    events = Events(np.ones(4), np.array([3.0, 1.0000000004, 1.0, 2.0]), np.array([1, 4, 7, 5]))
+    assert events.earliest(np.array([True, True, True, True])) == (1.0, 7)
+    assert events.earliest(np.array([True, True, False, True])) == (1.0, 4)
+    assert events._replace(times_s=np.ones(4)).earliest(np.array([False, True, True, True])) == (1.0, 4)
+
+
+times = st.lists(st.integers(0, 400), min_size=1, max_size=25).map(lambda us: np.array(sorted(us), dtype=float))
+
+
+@given(times_us=times, period_us=st.integers(1, 60), allowed_us=st.integers(0, 60))
+def test_an_event_is_too_early_by_its_worst_distance_to_one_before(
+    times_us: np.ndarray, period_us: int, allowed_us: int
+) -> None:
+    def early_us(kept: list[int], place: int) -> float:
+        """By which k events, the last at a place, span less than k - 1 periods."""
+        spans = (times_us[place] - times_us[first] for first in kept)
+        return max((len(kept) - nth) * period_us - span for nth, span in enumerate(spans)) if kept else 0.0
+
+    found = ahead(times_us, period_us)
+    assert found.tolist() == [max(early_us([*range(at)], at), 0.0) for at in range(len(times_us))]
+    # One that is too early by more than is allowed counts for none behind it.
+    kept: list[int] = []
+    for place, early in enumerate(policed(times_us, period_us, allowed_us).tolist()):
+        assert early == max(early_us(kept, place), 0.0)
+        if early <= allowed_us:
+            kept.append(place)
+
+
+@given(times_us=times, window_us=st.integers(0, 500))
+def test_no_rate_and_burst_bound_the_events_of_a_window_more_closely(times_us: np.ndarray, window_us: int) -> None:
+    """By the most events in each time, counted: the least b + r w of all lines b + r t over them."""
+    count = len(times_us)
+    least_us = {number: min(times_us[number - 1 :] - times_us[: count - number + 1]) for number in range(1, count + 1)}
+
+    def most(rate: float) -> float:
+        return max(number - rate * us for number, us in least_us.items()) + rate * window_us
+
+    rate = steady_rate(times_us, window_us)
+    slopes = {
+        (more - fewer) / (us - before)
+        for fewer, before in least_us.items()
+        for more, us in least_us.items()
+        if us > before
+    }
+    if times_us[-1] - times_us[0] <= window_us:
+        assert rate == 0
+    else:
+        assert most(rate) == pytest.approx(min(map(most, slopes)))
+
+
+def test_steps_and_expanded_uncertainties_are_those_of_a_hand_calculation() -> None:
+    assert step(np.array([0, 3000, 1500, 12_000])) == 1.5
+    assert step(np.array([5, 5])) == 0
+    assert expanded(3.0, 4.0) == 10
+    assert expanded(3.0, 4.0, stamps_us=0.5) == 10.5
+    assert expanded(3.0, None) is None
