@@ -1,5 +1,6 @@
 """Frames of recordings written by hand, field by field: candump's text, BLF, captures of SocketCAN and EtherCAT."""
 
+import os
 import struct
 import zlib
 from collections.abc import Callable
@@ -401,6 +402,19 @@ def test_each_interface_has_its_ticks_and_its_offset(tmp_path: Path) -> None:
     assert (notes.interfaces, notes.broken_at, notes.is_long) == ({0, 1, 2, 3, 4}, None, False)
     assert notes.synthetic == comment[:200]
     assert calls == [(len(content), len(content))]
+
+
+@pytest.mark.skipif(not Path("/dev/fd").is_dir(), reason="this system names no open files")
+def test_a_pipe_that_a_shell_opened_is_read_to_its_end() -> None:
+    """As of `busplan measured PROFILE <(command)`."""
+    reading, writing = os.pipe()
+    whole = pcapng([(0.0, b"one"), (1.0, b"two")])
+    os.write(writing, whole)
+    os.close(writing)
+    notes = CaptureNotes()
+    (piece,) = packets(Path(f"/dev/fd/{reading}"), notes, progress=nobody)
+    os.close(reading)
+    assert (len(piece.starts), notes.packets, notes.broken_at) == (2, 2, None)
 
 
 @pytest.mark.parametrize(
