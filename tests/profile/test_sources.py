@@ -52,13 +52,14 @@ def test_a_list_of_paths_means_each_profile_once_and_says_what_is_none() -> None
     assert named(collect(["a/other.toml", "a/text.txt"])) == [("a/other.toml", None), ("a/text.txt", None)]
     others = collect(["a/other.toml", "a/text.txt", "busplan.toml", "a/other.toml"], skip_others=True)
     assert (named(others), others.skipped) == ([("a/text.txt", None)], ("a/other.toml", "busplan.toml"))
-    refused = collect(["busplan.toml", "empty", "a/busplan.toml/x", "nowhere.toml", "nowhere.toml", "a\0b"])
+    refused = collect(["busplan.toml", "empty", "a/busplan.toml/x", "nowhere.toml", "nowhere.toml", "a\0b", "/a\0b"])
     assert [(name, failure and failure.partition(" shipped ")[0]) for name, failure in named(refused)] == [
         ("busplan.toml", "busplan.toml: has settings of `busplan check`, but no profile"),
         ("empty", "empty: no profile below this folder (a *.toml with a schema_version)"),
         ("a/busplan.toml/x", "a/busplan.toml/x: no such file, and no"),
         ("nowhere.toml", "nowhere.toml: no such file, and no"),
         ("a\0b", "a\0b: no such file, and no"),
+        ("/a\0b", "/a\0b: no such file, and no"),
     ]
 
 

@@ -518,6 +518,15 @@ def test_what_is_wrong_with_a_file_comes_placed() -> None:
     assert caught.value.placed == (
         PlacedProblem(7, 1, "out-of-range", "bus.nodes = 0: must be 1 or more", "bus.nodes", (9, 10)),
     )
+    # What is missing marks the table around it, at the top the first character; an unknown key marks itself.
+    with pytest.raises(PlacedError) as caught:
+        read(edited(('name = "test"', 'nme = "test"'), ("period_us = 4000\n", "")))
+    places = [(one.kind, one.key, one.line, one.column, one.marked) for one in caught.value.placed]
+    assert places == [
+        ("missing-key", "name", 1, 1, (1, 2)),
+        ("unknown-key", "nme", 2, 1, (1, 4)),
+        ("missing-key", "cycle.period_us", 8, 2, (2, 7)),
+    ]
     for content in (b"\xff", b"#" * (MAX_FILE_BYTES + 1), b"a", b"a = " + b"[" * 2000, b"a." * 21 + b"a = 1"):
         with pytest.raises(PlacedError) as caught:
             read(content)

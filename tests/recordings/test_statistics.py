@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from busplan.recordings.statistics import (
     Events,
+    PeriodicEvents,
     ahead,
     expanded,
     lateness,
@@ -102,14 +103,35 @@ def test_an_even_clock_has_no_doubt_of_its_bends() -> None:
     assert periodic.doubt_us == pytest.approx(0, abs=0.2)
 
 
-def test_a_period_and_its_uncertainty_are_the_same_backwards() -> None:
+@pytest.mark.parametrize("bend_us", [0.0, 300.0])
+def test_a_period_and_its_uncertainty_are_the_same_backwards(bend_us: float) -> None:
     # Late events become early ones: outliers of both sides count alike.
-    times = np.arange(4_000) * 1000.0 + np.random.default_rng(7).exponential(10, 4_000)
+    clock_us = np.interp(np.arange(4_000), [0, 700, 2500, 4_000], [0, bend_us, -bend_us, 0])
+    times = np.arange(4_000) * 1000.0 + clock_us + np.random.default_rng(7).exponential(10, 4_000)
+    times -= times[0]
     forwards, backwards = periodic_events(times), periodic_events(times[-1] - times[::-1])
     assert forwards is not None
     assert backwards is not None
     assert backwards.period_us == pytest.approx(forwards.period_us, abs=1e-9)
     assert backwards.uncertainty_us == pytest.approx(forwards.uncertainty_us, rel=1e-6)
+    assert backwards.doubt_us == pytest.approx(forwards.doubt_us, rel=1e-6)
+    assert backwards.late_us[::-1] == pytest.approx(-forwards.late_us, abs=1e-6)
+
+
+def test_the_latest_event_is_that_of_the_kindest_clock_and_of_others_that_may_be() -> None:
+    """By hand: delays of 0, 0, 0, 0 and 10 us against a period that may be 1 us off."""
+    late_us = np.array([0.0, 0, 0, 0, 10])
+    # Against a period of s us more they are 2 s, s, 0, -s and 10 - 2 s: over the least range where 2 s is 10 - 2 s.
+    found = lateness(PeriodicEvents(100.0, 1.0, late_us, 3.0, np.arange(5)), 1)
+    assert found.value == pytest.approx(7.5, abs=1e-3)
+    # With s of -2 the range is 18; half of what it is more, beside the drift.
+    assert found.uncertainty == pytest.approx(np.hypot((18 - 7.5) / 2, 3.0), abs=1e-3)
+    assert found.late_us == pytest.approx([0, 0, 0, 0, 7.5], abs=1e-3)
+    # Where the period is known, it is 10 us, and nothing is in doubt.
+    found = lateness(PeriodicEvents(100.0, 0.0, late_us, 0.0, np.arange(5)), 1)
+    assert (found.value, found.uncertainty, found.late_us.tolist()) == (10, 0, late_us.tolist())
+    # Of most of the events none is late.
+    assert lateness(PeriodicEvents(100.0, 0.0, late_us, 0.0, np.arange(5)), 0.8).value == 0
 
 
 def test_the_line_of_medians_is_numpys_weighted_fit() -> None:
