@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 import busplan
 from busplan.profile.kinds import cycle_keys, default_of, dotted_keys, profile_schema, words_of
+from busplan.sections.profile import varied_nodes
 
 TEXT = """\
 schema_version = 1
@@ -297,6 +298,8 @@ def test_a_cycle_depends_on_keys_of_its_own_and_on_those_of_the_verdict(tmp_path
     for keys in (alike, in_groups):
         assert not any(key.startswith(never) or key.endswith((".name", ".kind")) for key in keys)
         assert {key for key in keys if key.startswith("limits.")} == verdict
+        # Nor on what is no number and no word: the columns of a table.
+        assert not any(key.endswith(("execution.payload_bytes", "execution.time_us")) for key in keys)
     # A kind of bus may have limits that its cycle depends on.
     of_can = set(cycle_keys(busplan.load_profile("can-servo-8")))
     assert {key for key in of_can if key.startswith("limits.")} == {"limits.max_load", *verdict}
@@ -490,6 +493,67 @@ def test_a_payload_outside_the_table_is_refused_each_with_its_key(
 
 def test_a_linear_execution_time_knows_every_payload() -> None:
     assert profile(payload__read_bytes=1_000_000)
+
+
+def test_a_table_says_what_it_covers_and_refuses_the_rest() -> None:
+    known = table([4, 16, 64], [40, 34, 58])
+    assert (known.covered_bytes, known.range_bytes) == ((4, 64), "4 to 64 bytes")
+    assert [known.covers(size) for size in (3, 4, 64, 65)] == [False, True, True, False]
+    with pytest.raises(ValueError, match=r"^65 bytes is outside the execution table, 4 to 64 bytes$"):
+        known.execution_us(65)
+    linear = smallest().node_groups[0].node.execution
+    assert (linear.covered_bytes, linear.covers(0), linear.execution_us(0)) == ((0, math.inf), True, 30)
+
+
+@pytest.mark.parametrize(
+    ("servo", "grades", "words"),
+    [
+        ({}, ("assumed",), "assumed"),
+        ({"grade": "measured"}, ("measured",), "measured"),
+        ({"position_gain_per_s": 50, "x": {"drive_lag_us": 9}}, ("assumed", "assumed"), "assumed"),
+        (
+            # A lag of x, a gain of y, and a grade of each; a default that means none needs none.
+            {
+                "grade": "calibrated",
+                "x": {"drive_lag_us": 9},
+                "y": {"position_gain_per_s": 50},
+                "grades": {
+                    "drive_lag_us": "assumed",
+                    "position_gain_per_s": "published",
+                    "integral_gain_per_s2": "measured",
+                },
+            },
+            ("assumed", "published"),
+            "1 assumed, 1 published",
+        ),
+        ({"grade": "published", "grades": {"velocity_feedforward": "measured"}}, ("measured",), "measured"),
+    ],
+)
+def test_grades_of_a_servo_are_those_of_what_is_given(servo: Any, grades: tuple[str, ...], words: str) -> None:
+    found = profile(servo=servo).servo
+    assert found.grades_given == grades
+    assert found.grades_text == words
+    for axis in ("x", "y"):
+        own = {**{key: value for key, value in servo.items() if key == "position_gain_per_s"}, **servo.get(axis, {})}
+        keys = found.axis_keys(axis)
+        assert keys.items() >= own.items()
+        assert {key: keys[key] for key in keys.keys() - own.keys()} == {
+            key: value for key, value in smallest().servo.axis_keys(axis).items() if key not in own
+        }
+
+
+def test_the_circle_is_judged_by_the_tolerances_that_are_given() -> None:
+    assert not profile(tolerance__min_gain_margin_db=3).tolerance.judges_contour
+    judged = profile(tolerance={"circular_deviation_mm": 0.03, "mean_contour_error_mm": 0}).tolerance
+    assert judged.judged == ("mean_contour_error_mm", "circular_deviation_mm")
+    assert judged.judges_contour
+
+
+def test_the_nodes_that_vary_are_those_with_the_most_axes() -> None:
+    names = [varied_nodes(busplan.load_profile(name)).name for name in ("paper-4ms", "gantry-24")]
+    assert names == ["", "drives"]
+    more = busplan.load_profile("gantry-24", changes={"group.tool.nodes": 30})
+    assert varied_nodes(more).name == "tool"
 
 
 def test_a_converter_of_one_bit_is_refused() -> None:

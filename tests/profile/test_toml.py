@@ -244,6 +244,14 @@ def test_a_missing_section_of_a_group_has_the_header_that_the_file_needs() -> No
         f"group.io.execution: missing section [group.execution]; as one line, in its [[group]]: {EXECUTION}"
     )
     assert read(text + EXECUTION).name == "test"
+    linear = '[group.execution]\nkind = "linear"\nbase_us = -1\n'
+    assert [problem.partition(": ")[2] for problem in problems(text + linear)] == [
+        (
+            "group.io.execution.per_byte_us: missing key. Execution time per byte of payload [us/byte]; "
+            "for example per_byte_us = 0.35"
+        ),
+        "group.io.execution.base_us = -1: must be 0 or more",
+    ]
     assert the_problem(text.replace("[[group]]", "[group]") + EXECUTION).endswith(
         "group: expected an array of tables, each below [[group]]"
     )

@@ -376,14 +376,16 @@ def test_each_interface_has_its_ticks_and_its_offset(tmp_path: Path) -> None:
         ((2, b"a name"), (9, b"\x8a"), (14, struct.pack("<q", 5))): 2**10,
         ((14, struct.pack("<q", -3)), (9, b"\x00")): 1,
         ((14, b"\1"), (9, b"")): 10**6,
+        ((9, b"\x13"),): 10**18,  # more digits than a stamp has room for
     }
-    offsets_s = (0, 0, 5, -3, 0)
+    offsets_s = (0, 0, 5, -3, 0, 0)
     comment = "synthetic: of a test" + "." * 300
     words = option(1, comment.encode()) + option(2, b"synthetic: hardware") + option(1, b"a comment")
     content = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + words)
     for options in interfaces:
         content += block(1, struct.pack("<HHI", 1, 0, 0) + b"".join(option(*one) for one in options))
     content += block(0xBAD, b"a custom block")
+    content += block(6, struct.pack("<IIIII", 0, 0, 0, 4, 4) + b"1970")
     for number, ticks in enumerate(interfaces.values()):
         at = (10 + number) * ticks + ticks // 4
         fields = struct.pack("<IIIII", number, at >> 32, at & 0xFFFFFFFF, number + 1, number + 1)
@@ -394,12 +396,12 @@ def test_each_interface_has_its_ticks_and_its_offset(tmp_path: Path) -> None:
     # A quarter of a second is no tick of whole seconds.
     expected = [(10 + number + offset) * 10**9 + 250_000_000 for number, offset in enumerate(offsets_s)]
     expected[3] -= 250_000_000
-    assert piece.times_ns.tolist() == expected
-    assert piece.numbers.tolist() == [1, 2, 3, 4, 5]
+    assert piece.times_ns.tolist() == [0, *expected]
+    assert piece.numbers.tolist() == [1, 2, 3, 4, 5, 6, 7]
     read = [piece.content[at : at + size].tobytes() for at, size in zip(piece.starts, piece.sizes, strict=True)]
-    assert read == [b"A", b"BB", b"CCC", b"DDDD", b"EEEEE"]
-    assert (notes.packets, notes.start_ns, notes.left_out, notes.dropped) == (5, 10_250_000_000, 0, 0)
-    assert (notes.interfaces, notes.broken_at, notes.is_long) == ({0, 1, 2, 3, 4}, None, False)
+    assert read == [b"1970", b"A", b"BB", b"CCC", b"DDDD", b"EEEEE", b"FFFFFF"]
+    assert (notes.packets, notes.start_ns, notes.left_out, notes.dropped) == (7, 0, 0, 0)
+    assert (notes.interfaces, notes.broken_at, notes.is_long) == ({0, 1, 2, 3, 4, 5}, None, False)
     assert notes.synthetic == comment[:200]
     assert calls == [(len(content), len(content))]
 
@@ -451,3 +453,70 @@ def test_what_is_written_is_what_the_formats_say() -> None:
     )
     lines = [(1_700_000_000_000_001, "181#00"), (999_999, "7FF#")]
     assert written.candump(lines) == b"(1700000000.000001) synthetic 181#00\n(0000000000.999999) synthetic 7FF#\n"
+
+
+@pytest.mark.parametrize("form", [pcap, pcapng])
+@pytest.mark.parametrize("at_once", [1, 50, 1000])
+def test_a_file_is_read_in_pieces_of_any_size(
+    form: Callable[..., bytes], at_once: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    contents = [bytes([65 + number]) * (number * 7 % 30) for number in range(40)]
+    path, notes = tmp_path / "bus.pcap", CaptureNotes()
+    path.write_bytes(form([(10.0 * number, content) for number, content in enumerate(contents)]))
+    monkeypatch.setattr("busplan.recordings.capture._PIECE_BYTES", at_once)
+    read, times_ns, calls = [], [], []
+    for piece in packets(path, notes, progress=lambda *sizes: calls.append(sizes)):
+        read += [piece.content[at : at + size].tobytes() for at, size in zip(piece.starts, piece.sizes, strict=True)]
+        times_ns += piece.times_ns.tolist()
+    assert read == contents
+    assert [us - times_ns[0] for us in times_ns] == [10_000 * number for number in range(40)]
+    assert (notes.packets, notes.broken_at) == (40, None)
+    assert calls == sorted(calls)
+    assert calls[-1] == (path.stat().st_size,) * 2
+
+
+@pytest.mark.parametrize("form", [pcap, pcapng])
+def test_so_many_packets_are_read_and_no_more(
+    form: Callable[..., bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "bus.pcap"
+    written_after = [form([(10.0 * number, b"same") for number in range(count)]) for count in (3, 5)]
+    path.write_bytes(written_after[1])
+    monkeypatch.setattr("busplan.recordings.capture._PIECE_BYTES", len(written_after[0]) - 24 * (form is pcap))
+    for most, is_long in ((3, True), (4, False)):
+        monkeypatch.setattr("busplan.recordings.capture.MOST_PACKETS", most)
+        notes = CaptureNotes()
+        count = sum(len(piece.starts) for piece in packets(path, notes, progress=nobody))
+        # The rest of a piece is read, too.
+        assert count == (3 if is_long else 5)
+        assert (notes.is_long, notes.broken_at) == (True, len(written_after[not is_long]))
+
+
+def test_so_many_frames_of_a_log_are_read_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("busplan.recordings.can._MOST_FRAMES", 3)
+    frames, errors = "(1.0) can0 181#00\n", "(1.0) can0 20000088#\n"
+    for log, broken in (
+        (3 * frames, ""),
+        (2 * errors + frames, ""),
+        (4 * frames, "it has more than 3 frames; give a part of it"),
+        (frames + 4 * errors, "it has more than 3 frames; give a part of it"),
+    ):
+        found = of_file(log, tmp_path)
+        assert (found.broken, found.errors <= 3, len(found.times_us) <= 3) == (broken, True, True)
+
+
+def test_data_of_more_bytes_than_a_frame_has_end_a_capture(tmp_path: Path) -> None:
+    long = struct.pack(">IBBH", 0x181, 65, 4, 0) + bytes(65)
+    whole = captured(pcap)
+    record = struct.pack("<IIII", 1_700_000_000, 2_000_000, len(long), len(long)) + long
+    frames = of_file(whole + record + whole[24:], tmp_path)
+    assert (len(frames.times_us), frames.broken) == (len(ROWS), "data of 65 bytes")
+
+
+def test_a_capture_is_synthetic_by_the_address_of_its_port(tmp_path: Path) -> None:
+    own, other = (
+        of_capture([(0.0, ethernet(SENT, index=0, counters=(0, 0), master=master))], tmp_path).notes.synthetic
+        for master in (written.SYNTHETIC_PORT, bytes(6))
+    )
+    assert (own, other) == ("synthetic by the address of its port", "")
+    assert of_file("(1.0) synthetic 181#\n", tmp_path).synthetic == "synthetic by the name of its channel"
