@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 import busplan
 from busplan.profile.kinds import cycle_keys, default_of, dotted_keys, profile_schema, words_of
+from busplan.sections.cycle import time_uncertainty_us
 from busplan.sections.profile import varied_nodes
 
 TEXT = """\
@@ -228,6 +229,12 @@ def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth
     assumed = profile(host__transaction_us=5, host__grade="assumed").host
     assert assumed.standard_uncertainty_us == pytest.approx(5 / math.sqrt(3))
     assert profile(host__transaction_us=5, host__uncertainty_us=0).host.standard_uncertainty_us == 0
+    assert [
+        time_uncertainty_us(40.0, is_guess=guess, given_us=given) for guess in (False, True) for given in (3, None)
+    ] == [
+        *(3, 4.0),
+        *(3, pytest.approx(40 / math.sqrt(3))),
+    ]
 
 
 def test_every_default_is_a_value_that_the_schema_takes() -> None:

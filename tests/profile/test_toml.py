@@ -269,6 +269,26 @@ def test_an_array_of_tables_is_no_section_and_has_no_value_to_show(old: str, sub
 
 
 @pytest.mark.parametrize(
+    ("adapter", "words"),
+    [
+        ('"x"', 'bus.adapter = "x": expected "ftdi", "ftdi-low-latency" or "none"'),
+        ("3", 'bus.adapter = 3: expected "ftdi", "ftdi-low-latency" or "none"'),
+        ("{timer_us = -1}", "bus.adapter.timer_us = -1: must be 0 or more"),
+        (
+            "{timer_us = 0, nothing = 1}",
+            "bus.adapter.nothing: unknown key; known here: timer_us, packet_bytes, frame_us",
+        ),
+        ("{}", "bus.adapter.timer_us: missing key. Latency timer; 0 where the adapter sends each answer at once"),
+    ],
+)
+def test_a_key_that_is_a_name_or_a_table_is_refused_as_what_it_is(adapter: str, words: str) -> None:
+    shipped = (Path(__file__).parents[2] / "profiles" / "dynamixel-arm-14.toml").read_text(encoding="utf-8")
+    text = shipped.replace("adapter = { timer_us = 2000 }", f"adapter = {adapter}")
+    (message,) = problems(text)
+    assert message.partition(": ")[2].startswith(words)
+
+
+@pytest.mark.parametrize(
     ("text", "place"),
     [
         pytest.param(edited(('kind = "table"\n', "")), "18:7", id="header"),
@@ -433,6 +453,16 @@ def test_a_syntax_error_gives_one_message_with_its_place() -> None:
         assert int(match[1]) == line, problem
         # Where exactly on the line is the standard library's affair.
         assert abs(int(match[2]) - column) <= 2, problem
+
+
+def test_a_number_with_a_comma_or_a_sign_is_told_what_is_meant() -> None:
+    meant = {
+        "a = 1,5 # of 2": "; a number has a decimal point, not a comma: 1.5",
+        "a = 85 %": "; a share is a number without a sign: 0.85",
+        "a = 1 5": "",
+    }
+    for text, words in meant.items():
+        assert the_problem(f"b = 2\n{text}\n").partition("not valid TOML: ")[2].partition(";")[2] == words[1:]
 
 
 @pytest.mark.parametrize("text", ["a = [", "a = 1\nb = {x = 1", 'a = """', "a = [\n\n\n"])

@@ -52,6 +52,8 @@ def test_text_of_every_kind_survives(tmp_path: Path) -> None:
         },
     )
     assert read(profile_text(profile), tmp_path) == profile
+    # Lines of a text are lines of the file.
+    assert '\ndescription = """\ntwo\nlines, a' in profile_text(profile)
 
 
 def test_an_override_adds_no_section() -> None:

@@ -5,6 +5,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import can
@@ -208,6 +209,18 @@ def test_channels_are_counted_up_to_a_bound(tmp_path: Path) -> None:
         of_file(log(256), tmp_path)
     assert of_file(log(256), tmp_path, channel="can9").broken == ""
     assert of_file(log(257), tmp_path, channel="can9").broken == "over 256 channels"
+
+
+def test_bits_of_frames_are_those_written_one_by_one(tmp_path: Path) -> None:
+    random, sent = Random(1), []
+    for _ in range(150):
+        extended = random.random() < 0.4
+        data = bytes(random.choice((0, 0, 255, 255, 0x0F, 0xC3, 0x3E, random.randrange(256))) for _ in range(8))
+        identifier = random.choice((0, 1 << 10, random.randrange(1 << (29 if extended else 11))))
+        sent.append(Queued(0.0, identifier, data[: random.randint(0, 8)], extended))
+    names = [f"{frame.identifier:0{8 if frame.extended else 3}X}#{frame.data.hex()}" for frame in sent]
+    frames = of_file("".join(f"(1.0) can0 {name}\n" for name in names), tmp_path)
+    assert frames.bits.tolist() == [*map(bits_of, sent)]
 
 
 def test_a_classical_frame_has_8_bytes_whatever_more_its_length_code_says(tmp_path: Path) -> None:

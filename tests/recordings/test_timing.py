@@ -224,6 +224,7 @@ def test_a_bit_rate_is_as_high_as_frames_need_that_do_not_overlap(tmp_path: Path
         ([0, 100, 300, 400], 0),  # each as soon as the bus allows, or later
         ([0, 100, 250, 350], 50 + 200),  # one comes 50 us too soon, and may be as late as the longest frame
         ([0, 100, 200, 400], 0),  # stamps of the starts
+        ([0, 51, 200, 401], 49 + 200),  # the second by its start
         ([0, 100, 299, 399], 1),  # by no more than a step of the stamps
     ],
 )
