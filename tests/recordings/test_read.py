@@ -99,12 +99,13 @@ def test_a_log_has_each_field_of_each_frame(tmp_path: Path) -> None:
     frames = of_file(LOG, tmp_path, channel="can0")
     has(frames, ROWS)
     assert frames.start_s == pytest.approx(1_700_000_000.0001, abs=1e-6)
-    # The first frame of the log is another channel's; so is one line of two errors without a channel of its own.
+    # The first frame of the log is another channel's.
     assert frames.lead_us == pytest.approx(100, abs=0.3)
     assert (frames.errors, frames.error_numbers.tolist()) == (1, [4])
     assert frames.errors_us.tolist() == pytest.approx([300], abs=0.3)
-    (at_s, number), events = frames.error_events().earliest(np.array([True])), frames.error_events()
-    assert (at_s, number, events.values.tolist()) == (pytest.approx(400e-6, abs=3e-7), 4, [1])
+    errors = frames.error_events()
+    assert errors.times_s.tolist() == pytest.approx([400e-6], abs=3e-7)
+    assert (errors.frames.tolist(), errors.values.tolist()) == ([4], [1])
     of_two = frames.events(np.array([7.0, 8.0]), np.array([1, 3]))
     assert (of_two.frames.tolist(), of_two.values.tolist()) == ([3, 6], [7, 8])
     assert of_two.times_s.tolist() == pytest.approx([350e-6, 600e-6], abs=3e-7)
@@ -242,8 +243,8 @@ def blf(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
     path = tmp_path_factory.mktemp("blf") / "bus.blf"
     with can.Logger(str(path)) as writer:
         for number in range(10):
-            options = {"arbitration_id": 0x181, "data": bytes([number]), "is_extended_id": False, "channel": 0}
-            writer(can.Message(timestamp=1_700_000_000 + number, **options))
+            stamp_s, data = 1_700_000_000 + number, bytes([number])
+            writer(can.Message(stamp_s, arbitration_id=0x181, is_extended_id=False, data=data, channel=0))
     content = path.read_bytes()
     at = content.index(b"LOBJ")
     return content[:at], zlib.decompress(content[at + 32 :])
