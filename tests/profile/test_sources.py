@@ -12,6 +12,7 @@ import busplan
 from busplan import BusplanError
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.profile.document import decode, profile_of, read_bytes
+from busplan.profile.edit import profile_text
 from busplan.profile.sources import Collection, collect
 
 LINE = """\
@@ -105,6 +106,8 @@ def test_data_of_no_file_are_a_profile_or_refused_by_their_keys() -> None:
     Path("line.toml").write_text(LINE)
     data = tomllib.loads(LINE)
     assert profile_of(data) == busplan.load_profile("line.toml")
+    # Without a file it has no comments, and is written with what it sets alone.
+    assert tomllib.loads(profile_text(profile_of(data))) == data
     data["bus"] |= {"nodes": 0, "x": 1}
     with pytest.raises(BusplanError) as caught:
         profile_of(data)
@@ -166,3 +169,50 @@ def test_a_machine_of_couplers_alone_stays_as_it_is() -> None:
     Path("groups.toml").write_text(f"{head}[[group]]{coupler}")
     with pytest.raises(BusplanError, match="nodes without data have no part in the cycle"):
         converted(busplan.load_profile("groups.toml"), "can")
+
+
+CAN_GROUPS = """\
+schema_version = 1
+name = "groups"
+bus = {kind = "can", bit_rate_kbit_s = 1000}
+cycle = {period_us = 10000}
+[[group]]
+name = "drives"
+nodes = 3
+axes = 2
+pdo_per = "axis"
+feedback_pdos = [6, 2]
+command_pdos = [7]
+every = 2
+execution = {kind = "linear", base_us = 10, per_byte_us = 0.1}
+[[group]]
+name = "io"
+nodes = 2
+axes = 0
+feedback_pdos = [4]
+command_pdos = []
+every = 4
+execution = {kind = "linear", base_us = 10, per_byte_us = 0.1}
+"""
+
+
+def test_pdos_are_bytes_on_another_bus_and_rates_stay_where_it_has_rates() -> None:
+    Path("groups.toml").write_text(CAN_GROUPS)
+    own: Any = busplan.load_profile("groups.toml")
+    own_keys = [f"group.{name}.{key}" for name in ("drives", "io") for key in ("feedback_pdos", "command_pdos")]
+    for kind, rates, left_out in (
+        ("ethercat", [2, 4], {"bus.bit_rate_kbit_s", "group.drives.pdo_per", *own_keys}),
+        (
+            "ieee1394",
+            [None, None],
+            {"bus.bit_rate_kbit_s", "group.drives.pdo_per", *own_keys, "group.drives.every", "group.io.every"},
+        ),
+    ):
+        found = converted(own, kind)
+        sizes = [[int(group.bytes_of(way)) for way in ("read", "write")] for group in found.profile.node_groups]
+        assert sizes == [[16, 14], [4, 0]]
+        drives: Any = found.profile.group[0]
+        # What each axis adds stays what each axis adds.
+        assert (drives.read_bytes_per_axis, drives.write_bytes_per_axis) == (8, 7)
+        assert [getattr(group, "every", None) for group in found.profile.group] == rates
+        assert {*found.left_out} == left_out
