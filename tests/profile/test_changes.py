@@ -286,3 +286,11 @@ def test_options_give_the_changes_and_the_period_again() -> None:
     profile = given.applied(shipped())
     assert (profile.cycle.period_us, profile.bus.nodes) == (812.5, 3)
     assert dict(profile.constants)["ARBITRATION_HOLD_US"] == 2.0
+
+
+def test_a_constant_changes_the_defaults_of_sections_that_nothing_else_touches() -> None:
+    before: Any = shipped()
+    after: Any = changes("constants.ARBITRATION_HOLD_US=2.5", "constants.PACKET_OVERHEAD_BYTES=30").applied(before)
+    assert (before.node.response_us, before.payload.overhead_bytes) == (1.63, 20)
+    # The overhead is in the file.
+    assert (after.node.response_us, after.payload.overhead_bytes) == (2.5, 20)

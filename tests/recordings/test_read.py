@@ -202,6 +202,17 @@ def test_a_line_that_is_no_frame_ends_the_log(line: str, broken: str, tmp_path: 
     assert (frames.broken, len(frames.times_us)) == (broken, 1 if broken else 3)
 
 
+def test_an_error_frame_without_a_stamp_is_one_that_came_at_no_time(tmp_path: Path) -> None:
+    stamps = ("-0.5", "8589934592.0", "0", "1.5", "nan")
+    lines = "".join(f"({stamp}) can0 20000088#\n" for stamp in stamps)
+    frames = of_file(f"{lines}(1.0) can0 181#\n", tmp_path)
+    assert (frames.broken, frames.errors, frames.error_numbers.tolist()) == ("", 5, [1, 2, 3, 4, 5])
+    found = frames.error_events()
+    # The log begins with the third.
+    assert (found.times_s.tolist(), found.frames.tolist()) == ([0, 1.5], [3, 4])
+    assert frames.lead_us == 1e6
+
+
 def test_channels_are_counted_up_to_a_bound(tmp_path: Path) -> None:
     def log(channels: int) -> str:
         return "".join(f"(1.{number:06d}) can{number} 181#00\n" for number in range(channels))

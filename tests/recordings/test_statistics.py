@@ -106,6 +106,19 @@ def test_a_bend_is_followed_as_soon_as_it_shows() -> None:
     assert np.std(means) == pytest.approx(0.13, abs=0.05)
 
 
+def test_the_doubt_of_a_clock_that_bends_is_as_large_as_its_errors() -> None:
+    random, count, ratios = np.random.default_rng(10), 4_000, []
+    clock = np.interp(np.arange(count), [0, count / 2, count], [0, 100, 0])
+    for _ in range(20):
+        late = random.uniform(0, 10, count)
+        periodic = periodic_events(np.arange(count) * 1000.0 + clock + late)
+        assert periodic is not None
+        errors = periodic.late_us - late
+        ratios.append(float(np.ptp(errors)) / 2 / periodic.doubt_us)
+    assert max(ratios) < 2
+    assert 0.4 < np.mean(ratios) < 0.8
+
+
 def test_the_uncertainty_of_a_period_is_that_of_the_slope_of_a_line() -> None:
     # Of n points a period apart with errors of sigma: sigma sqrt(12 / n^3); of uniform ones of 10 us sigma is 2.89.
     random, count = np.random.default_rng(6), 20_000
