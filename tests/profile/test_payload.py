@@ -150,6 +150,21 @@ def test_a_group_has_data_whatever_its_axes(payload: str, problem: str) -> None:
     assert [message.partition(": ")[2] for message in caught.value.problems] == [problem]
 
 
+def test_nodes_are_alike_or_in_groups_and_not_both() -> None:
+    group = f'[[group]]\nname = "io"\nnodes = 1\naxes = 1\nread_bytes = 4\nwrite_bytes = 4\n[group.execution]\n{LINE}\n'
+    text = TEXT.format(payload="read_bytes = 4\nwrite_bytes = 4", execution=LINE) + group
+    Path("gantry.toml").write_text(text + group, encoding="utf-8")
+    with pytest.raises(busplan.BusplanError) as caught:
+        busplan.load_profile("gantry.toml")
+    own = "each [[group]] has its own; remove one of the two"
+    assert [message.partition(": ")[2] for message in caught.value.problems] == [
+        "bus.nodes = 2: this profile has groups; set group.NAME.nodes instead",
+        f"payload: {own}",
+        f"node: {own}",
+        'group[1].name = "io": there is a group of this name',
+    ]
+
+
 def test_one_direction_may_have_no_data_and_both_may_not() -> None:
     table = 'kind = "table"\npayload_bytes = [4, 16]\ntime_us = [36.7, 36.3]'
     assert profile("read_bytes_per_axis = 4\nwrite_bytes = 0", table)

@@ -97,6 +97,8 @@ def test_a_machine_s_file_is_named_whatever_its_characters(encoding: str) -> Non
     eni = '<?xml version="1.0"?>\n<!-- a comment -->\n<x:EtherCATConfig>\u00fc</x:EtherCATConfig>'
     with pytest.raises(BusplanError, match=r"^x:1:1: is ENI, not a profile; convert it with `busplan import x`$"):
         decode(("\ufeff" * encoding.startswith("utf-16") + eni).encode(encoding), name="x").data()
+    with pytest.raises(BusplanError, match=r"^x:1:1: is a CAN log, not a profile; convert it with `busplan import x`$"):
+        decode(b"(1.000000) can0 181#00\n", name="x").data()
     # Zeros are of no text.
     with pytest.raises(BusplanError, match=r"not a text file|not valid TOML"):
         decode(b"\xff\0" + text.encode("cp1252"), name="x").data()

@@ -431,6 +431,15 @@ def test_each_interface_has_its_ticks_and_its_offset(tmp_path: Path) -> None:
     assert calls == [(len(content), len(content))]
 
 
+def test_a_comment_of_an_interface_is_no_mark_of_the_file(tmp_path: Path) -> None:
+    words = option(1, b"synthetic: an interface")
+    content = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
+    content += block(1, struct.pack("<HHI", 1, 0, 0) + words) + block(0xBAD, bytes(40))
+    path, notes = tmp_path / "bus.pcapng", CaptureNotes()
+    path.write_bytes(content)
+    assert (list(packets(path, notes, progress=nobody)), notes.synthetic, notes.broken_at) == ([], "", None)
+
+
 @pytest.mark.skipif(not Path("/dev/fd").is_dir(), reason="this system names no open files")
 def test_a_pipe_that_a_shell_opened_is_read_to_its_end() -> None:
     """As of `busplan measured PROFILE <(command)`."""
