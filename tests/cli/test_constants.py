@@ -39,6 +39,7 @@ def test_the_paper_s_hold_time_is_changed_everywhere(run: Run) -> None:
         ("constants.arbitration_hold_us=long", "expected a finite number"),
         ("constants.arbitration_hold_us=nan", "expected a finite number"),
         ("constants.base_rate_mbit_s=0", "expected a number above 0"),
+        ("constants.arbitration_hold_us=-0.5", "expected a number above 0"),
         ("BASE_RATE_MBIT_S=1000", "no key of a profile; did you mean constants.BASE_RATE_MBIT_S?"),
         ("constants.EQ15_CONSTANT_US=3", "cannot be changed: equation (15) is tested as it is printed"),
     ],

@@ -365,3 +365,32 @@ def test_axes_alone_get_the_nodes_that_they_need(run: Run, tmp_path: Path) -> No
     run("init", "press", "--axes", 6, cwd=tmp_path)
     data = tomllib.loads((tmp_path / "press.toml").read_text(encoding="utf-8"))
     assert (data["bus"]["nodes"], data["node"]["axes"]) == (2, 3)
+
+
+def test_axes_that_do_not_divide_evenly_make_two_groups_each_with_its_own_hints(run: Run, tmp_path: Path) -> None:
+    run("init", "odd", "--nodes", 3, "--axes", 7, "--period", "850us", "--bytes-per-axis", 5, cwd=tmp_path)
+    text = (tmp_path / "odd.toml").read_text(encoding="utf-8")
+    data = tomllib.loads(text)
+    sizes = {"read_bytes_per_axis": 5, "write_bytes_per_axis": 5}
+    assert [{key: group[key] for key in group if key != "execution"} for group in data["group"]] == [
+        {"name": "axes-3", "nodes": 1, "axes": 3, **sizes},
+        {"name": "axes-2", "nodes": 2, "axes": 2, **sizes},
+    ]
+    assert re.findall(r"busplan calibrate odd.toml MEASUREMENTS.csv( --group \S+)? --apply", text) == [
+        " --group axes-3",
+        " --group axes-2",
+    ]
+    assert "nodes" not in data["bus"]
+    # The longest step up to 100 us that divides 850.
+    assert (data["servo"]["step_us"], data["cycle"]) == (85, {"period_us": 850, "slice_ratio": 0.8})
+    # Comments stand below each other.
+    columns = {line.index("#") for line in text.splitlines() if re.match(r"(?!payload)[a-z].{0,25} #", line)}
+    assert columns == {27}
+
+
+def test_a_rate_that_is_given_is_not_assumed(run: Run, tmp_path: Path) -> None:
+    given = ("--bus", "can", "--nodes", 3, "--axes", 6, "--period", "4ms", "--bit-rate", 250)
+    run("init", "slow", *given, cwd=tmp_path)
+    text = (tmp_path / "slow.toml").read_text(encoding="utf-8")
+    assert re.findall("(?m)^bit_rate.*", text) == ["bit_rate_kbit_s = 250"]
+    assert "\nnodes = 3                  # the host is not counted\n" in text

@@ -1,6 +1,7 @@
 """`--set KEY=VALUE`: how it is read, which two options exclude each other, and what a refusal names."""
 
 import re
+import subprocess
 from functools import cache
 from typing import Any
 
@@ -12,7 +13,16 @@ import busplan
 from busplan import BusplanError, Profile
 from busplan.buses import kind_names
 from busplan.english import listed
-from busplan.profile.changes import KeyChange, KeyChanges, parse_set, without_units
+from busplan.profile.changes import (
+    NO_CHANGES,
+    KeyChange,
+    KeyChanges,
+    change_options,
+    parse_set,
+    period_option,
+    shell_word,
+    without_units,
+)
 
 KINDS = listed([f'"{one}"' for one in kind_names()], "or")
 
@@ -70,6 +80,19 @@ def test_a_number_may_have_its_unit(text: str, value: float) -> None:
     assert f"in {change.key.rpartition('_')[2] if 'kbit' not in text else 'kbit_s'} {value:g}" in change.note
 
 
+def test_a_number_that_is_none_in_toml_is_told_what_is_meant() -> None:
+    for written, meant in [
+        ("1,5", "a number has a decimal point, not a comma: 1.5"),
+        ("-2,25", "a number has a decimal point, not a comma: -2.25"),
+        ("15%", "a share is a number without a sign: 0.15"),
+        ("2.5 %", "a share is a number without a sign: 0.025"),
+    ]:
+        with pytest.raises(BusplanError) as caught:
+            parse_set([f"cycle.slice_ratio={written}"])
+        refused = f"--set cycle.slice_ratio={written}: {written} is not a TOML value; {meant}"
+        assert caught.value.problems == (refused,)
+
+
 def test_units_of_a_grid_are_those_of_its_key_and_others_stay() -> None:
     assert without_units("0.5ms,3mm:2s,S200,7", key="cycle.period_us") == "500,3mm:2000000,S200,7"
 
@@ -99,6 +122,13 @@ def test_a_unit_of_another_quantity_is_refused() -> None:
 def test_a_key_that_is_not_there_is_told_where_it_is(text: str, words: str) -> None:
     with pytest.raises(BusplanError, match=re.escape(words)):
         KeyChanges(parse_set([text])).applied(busplan.load_profile("paper-4ms"))
+
+
+def test_a_key_of_a_group_is_told_where_it_is() -> None:
+    with pytest.raises(BusplanError) as caught:
+        KeyChanges(parse_set(["group.io.every=2"])).applied(busplan.load_profile("gantry-24"))
+    words = 'unknown key on this bus; it is a key where bus.kind is "can" or "ethercat"'
+    assert caught.value.problems == (f"--set group.io.every=2: {words}",)
 
 
 @pytest.mark.parametrize(
@@ -213,3 +243,62 @@ def test_a_long_value_is_shortened_in_messages() -> None:
 def test_no_change_gives_the_profile_itself() -> None:
     profile = shipped()
     assert KeyChanges().applied(profile) is profile
+
+
+WORDS = {
+    "line.toml": "line.toml",
+    "line 1.toml": "'line 1.toml'",
+    "-": "-",
+    "-x.toml": "./-x.toml",
+    "it's": """'it'"'"'s'""",
+    "$HOME;`x`": "'$HOME;`x`'",
+    "": "''",
+    "\u00fc": "'\u00fc'",
+    "two\nlines '\\": "$'two\\x0alines \\x27\\x5c'",
+    "-\x1b[31m\u00fc": "$'./-\\x1b\\x5b31m\\xc3\\xbc'",
+}
+
+
+def test_a_word_of_a_shell_is_the_text_again() -> None:
+    assert {text: shell_word(text) for text in WORDS} == WORDS
+    printed = subprocess.run(
+        ["bash", "-c", f"printf '%s\\0' {' '.join(WORDS.values())}"],
+        check=True,
+        capture_output=True,
+        env={"LC_ALL": "C.UTF-8"},
+    )
+    read = printed.stdout.decode().split("\0")[:-1]
+    # What begins with a dash is no option where the word is a path.
+    assert read == [f"./{text}" if text.startswith("-") and text != "-" else text for text in WORDS]
+
+
+def test_options_give_the_changes_and_the_period_again() -> None:
+    given = KeyChanges(
+        (
+            KeyChange("cycle.period_us", 812.5, "--period", "0.8125ms"),
+            *parse_set(["node.execution={kind='linear', base_us=30, per_byte_us=0.1}", "bus.nodes = 3"]),
+            *parse_set(["constants.ARBITRATION_HOLD_US=2"]),
+        )
+    )
+    table = """'node.execution={kind='"'"'linear'"'"', base_us=30, per_byte_us=0.1}'"""
+    words = [*change_options(given, period_us=812.5)]
+    assert words == [
+        *("--period", "812.5us", "--set", table, "--set", "bus.nodes=3", "--set", "constants.ARBITRATION_HOLD_US=2"),
+    ]
+    assert [period_option(us)[1] for us in (500.0, 0.1, 1e-3, 1e9)] == ["500us", "0.1us", "0.001us", "1000000000us"]
+    assert given.words == " and ".join(f"--set {change.text}" for change in given.entries[1:])
+    assert [change.key for change in given.constants] == ["constants.ARBITRATION_HOLD_US"]
+    assert [*given.of_profile.values] == ["cycle.period_us", "node.execution", "bus.nodes"]
+    assert [*given.without(key="node.execution").values] == ["cycle.period_us", "bus.nodes"]
+    assert dict(given.changed_constants) == {**dict(NO_CHANGES.changed_constants), "ARBITRATION_HOLD_US": 2.0}
+    profile = given.applied(shipped())
+    assert (profile.cycle.period_us, profile.bus.nodes) == (812.5, 3)
+    assert dict(profile.constants)["ARBITRATION_HOLD_US"] == 2.0
+
+
+def test_a_constant_changes_the_defaults_of_sections_that_nothing_else_touches() -> None:
+    before: Any = shipped()
+    after: Any = changes("constants.ARBITRATION_HOLD_US=2.5", "constants.PACKET_OVERHEAD_BYTES=30").applied(before)
+    assert (before.node.response_us, before.payload.overhead_bytes) == (1.63, 20)
+    # The overhead is in the file.
+    assert (after.node.response_us, after.payload.overhead_bytes) == (2.5, 20)

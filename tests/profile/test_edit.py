@@ -362,6 +362,12 @@ def test_an_inline_group_is_left_with_its_lines() -> None:
         edited_file(f"{head}{inline}{tail}".encode(), {"group.a.execution.grade": "measured"}, name="x")
     assert caught.value.problems[0].startswith("x: there is no line [group.execution], so that it stays as it is")
     assert caught.value.problems[1:] == ("[group.execution]  # of a", 'grade = "measured"')
+    table = inline.removeprefix("[[group]]\n").strip().replace("\n", ", ")
+    first, others = head.split("[bus]", 1)
+    text = f"{first}group = [{{{table}}}]\n[bus]{others}{tail}"
+    with pytest.raises(BusplanError) as caught:
+        edited_file(text.encode(), {"group.a.read_bytes_per_axis": 2}, name="x")
+    assert caught.value.problems[1:] == ("[[group]]  # a", "read_bytes_per_axis = 2")
 
 
 def test_a_group_without_the_section_is_left_with_its_lines() -> None:

@@ -1,13 +1,16 @@
 """Measurements from CSV: what is right is read, what is wrong is said at its place, all at once."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
 from busplan import BusplanError
+from busplan.profile.measurements import measurements_from, parse_measurements
 
 EXPECTED = "expected payload_bytes,latency_us and, where known, transaction"
 
@@ -96,6 +99,79 @@ x,1e400,dma
         "m.csv:8:1: 2 values for 3 columns",
         "m.csv:9:3: latency_us '1_0': expected a number with a point, as 48.7",
     ]
+
+
+def test_the_largest_values_are_taken_and_long_ones_are_shortened() -> None:
+    (most,) = parse_measurements(b"payload_bytes,latency_us\n1000000,1e9", name="m.csv")
+    assert most == (2, "write", 1_000_000, 1e9)
+    for digits, shown in ((40, "x" * 40), (41, f"{'x' * 40}...")):
+        text = f"payload_bytes,latency_us\n4,{'x' * digits}"
+        assert refusals(text) == [f"m.csv:2:3: latency_us '{shown}': expected a number with a point, as 48.7"]
+    assert refusals("payload_bytes,latency_us\n1000001,1000000000.1") == [
+        "m.csv:2:1: payload_bytes '1000001': must be greater than 0 and no more than 1,000,000",
+        "m.csv:2:9: latency_us '1000000000.1': must be greater than 0 and no more than 1,000,000,000",
+    ]
+
+
+class Frame:
+    """What a data frame has: names of columns, and an array of each."""
+
+    def keys(self) -> list[str]:
+        return ["latency_us", "payload_bytes"]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return np.array([48.7, 55.0] if name == "latency_us" else [4, 16])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        [(4, 48.7), (16, 55.0)],
+        [[4, 48.7, "write"], [16, 55.0, "WRITE"]],
+        np.array([[4, 48.7], [16, 55.0]]),
+        [np.array([4, 48.7]), np.array([16, 55.0])],
+        iter([(4, 48.7), (16, 55.0)]),
+        [{"latency_us": 48.7, "payload_bytes": 4}, {"payload_bytes": 16, "latency_us": np.float64(55)}],
+        {"payload_bytes": (4, 16), "latency_us": np.array([48.7, 55.0]), "transaction": ["write", "write"]},
+        Frame(),
+    ],
+    ids=lambda given: type(given).__name__,
+)
+def test_tables_of_python_are_read_as_a_file(given: Any) -> None:
+    assert measurements_from(given, name="m") == ((1, "write", 4, 48.7), (2, "write", 16, 55.0))
+
+
+TABLE = "expected a CSV file, CSV text, columns by name, or rows: each a mapping"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (4, f"m 4: {TABLE}"),
+        ({}, f"m: {TABLE}"),
+        ({"payload_bytes": "4", "latency_us": [48.7]}, f"m: {TABLE}"),
+        ({"payload_bytes": 4, "latency_us": 48.7}, f"m: {TABLE}"),
+        ([(4,)], f"m: {TABLE}"),
+        ([(4, 48.7, "write", 1)], f"m: {TABLE}"),
+        (["4,48.7"], f"m: {TABLE}"),
+        (
+            {"payload_bytes": [4, 16], "latency_us": [48.7]},
+            "m: payload_bytes has 2 values, latency_us has 1 values; expected one of each for a measurement",
+        ),
+        (
+            [{"payload_bytes": 4, "latency_us": 1}, {"payload_bytes": 4}],
+            "m: row 2 has payload_bytes, and row 1 has payload_bytes, latency_us",
+        ),
+        ([(4, 48.7), (16, "x")], "m:2:2: latency_us 'x': expected a number with a point, as 48.7"),
+        ([(4, 48.7), (16,)], "m:2:1: 1 value for 2 columns"),
+        ([], "m:1:1: no measurement below the header"),
+    ],
+    ids=str,
+)
+def test_what_is_no_table_of_measurements_is_refused(given: Any, words: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        measurements_from(given, name="m")
+    assert str(caught.value).startswith(words)
 
 
 def test_very_many_problems_are_counted() -> None:

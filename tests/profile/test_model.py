@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import busplan
-from busplan.profile.kinds import words_of
+from busplan.profile.kinds import cycle_keys, default_of, dotted_keys, profile_schema, words_of
+from busplan.sections.cycle import time_uncertainty_us
+from busplan.sections.profile import varied_nodes
 
 TEXT = """\
 schema_version = 1
@@ -227,6 +229,12 @@ def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth
     assumed = profile(host__transaction_us=5, host__grade="assumed").host
     assert assumed.standard_uncertainty_us == pytest.approx(5 / math.sqrt(3))
     assert profile(host__transaction_us=5, host__uncertainty_us=0).host.standard_uncertainty_us == 0
+    assert [
+        time_uncertainty_us(40.0, is_guess=guess, given_us=given) for guess in (False, True) for given in (3, None)
+    ] == [
+        *(3, 4.0),
+        *(3, pytest.approx(40 / math.sqrt(3))),
+    ]
 
 
 def test_every_default_is_a_value_that_the_schema_takes() -> None:
@@ -235,6 +243,80 @@ def test_every_default_is_a_value_that_the_schema_takes() -> None:
     whole = loaded.model_dump()
     sections = ("bus", "cycle", "payload", "node", "servo", "mechanics", "delivery", "circle", "tolerance", "limits")
     assert busplan.load_profile(loaded, changes={name: whole[name] for name in sections}) == loaded
+
+
+SHIPPED = ("gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
+MESSAGES = """\
+schema_version = 1
+name = "alone"
+bus = {kind = "can", bit_rate_kbit_s = 500}
+[[message]]
+name = "a"
+identifier = 0x181
+payload_bytes = 2
+period_us = 1000
+"""
+
+
+def defaults_in(schema: dict[str, Any], node: dict[str, Any], parts: list[str]) -> list[object]:
+    """Defaults of a key in a JSON Schema, one for each table that may have it."""
+    places = [node]
+    for part in parts:
+        found = []
+        while places:
+            place = places.pop()
+            if "$ref" in place:
+                places.append(schema["$defs"][place["$ref"].rpartition("/")[2]])
+            places += place.get("anyOf", []) + place.get("oneOf", [])
+            if part in place.get("properties", {}):
+                found.append(place["properties"][part])
+        places = found
+    return [place.get("default") for place in places]
+
+
+def test_the_schema_has_defaults_and_titles_of_the_model() -> None:
+    schema = profile_schema()
+    of_kinds = {
+        choice["if"]["properties"]["bus"]["properties"]["kind"]["const"]: choice["then"] for choice in schema["allOf"]
+    }
+    for name in SHIPPED:
+        loaded = busplan.load_profile(name)
+        keys = {key: entry.value for key, entry in dotted_keys(loaded).items() if entry.source == "default"}
+        assert len(keys) > 10
+        for key, value in keys.items():
+            assert default_of(loaded, key) == (list(value) if isinstance(value, tuple) else value)
+            if value is not None and not key.startswith(("group", "message")):
+                assert value in defaults_in(schema, of_kinds[loaded.bus.kind], key.split(".")), key
+        for key in ("schema_version", "cycle.period_us", "bus.kind", "cycle.period_us.x", "nothing.at_all"):
+            assert default_of(loaded, key) is None
+    titles = {name: part["title"] for name, part in schema["$defs"].items() if name.endswith(("Group", "Section"))}
+    assert [name for name, title in titles.items() if title not in name] == []
+    assert titles["EthercatGroup"] == titles["GroupSection"] == "Group"
+    assert titles["Ieee1394CycleSection"] == "Cycle"
+
+
+def test_a_cycle_depends_on_keys_of_its_own_and_on_those_of_the_verdict(tmp_path: Path) -> None:
+    alike, in_groups = (set(cycle_keys(busplan.load_profile(name))) for name in ("paper-4ms", "gantry-24"))
+    verdict = {"limits.reserve", "limits.missed_cycles"}
+    assert alike >= {"bus.nodes", "cycle.period_us", "node.axes", "payload.read_bytes", "host.transaction_us", *verdict}
+    assert in_groups >= {"bus.speed", "group.io.nodes", "group.drives.execution.base_us", *verdict}
+    assert not any(key.startswith(("bus.nodes", "node.", "payload.")) for key in in_groups)
+    never = ("servo.", "circle.", "tolerance.", "delivery.", "mechanics.", "name", "description", "schema_version")
+    for keys in (alike, in_groups):
+        assert not any(key.startswith(never) or key.endswith((".name", ".kind")) for key in keys)
+        assert {key for key in keys if key.startswith("limits.")} == verdict
+        # Nor on what is no number and no word: the columns of a table.
+        assert not any(key.endswith(("execution.payload_bytes", "execution.time_us")) for key in keys)
+    # A kind of bus may have limits that its cycle depends on.
+    of_can = set(cycle_keys(busplan.load_profile("can-servo-8")))
+    assert {key for key in of_can if key.startswith("limits.")} == {"limits.max_load", *verdict}
+    (tmp_path / "alone.toml").write_text(MESSAGES)
+    alone = busplan.load_profile(tmp_path / "alone.toml")
+    assert cycle_keys(alone)
+    left = of_can - set(cycle_keys(alone))
+    assert left >= {"cycle.period_us", "node.axes", "payload.read_bytes", "bus.nodes", *verdict}
+    assert not any(key.startswith(("cycle.", "node.", "payload.", "bus.nodes")) for key in cycle_keys(alone))
+    assert not any(key.startswith(("cycle.", "node.", "payload.")) for key in dotted_keys(alone))
 
 
 # --- the bus ----------------------------------------------------------------------------------------------
@@ -418,6 +500,67 @@ def test_a_payload_outside_the_table_is_refused_each_with_its_key(
 
 def test_a_linear_execution_time_knows_every_payload() -> None:
     assert profile(payload__read_bytes=1_000_000)
+
+
+def test_a_table_says_what_it_covers_and_refuses_the_rest() -> None:
+    known = table([4, 16, 64], [40, 34, 58])
+    assert (known.covered_bytes, known.range_bytes) == ((4, 64), "4 to 64 bytes")
+    assert [known.covers(size) for size in (3, 4, 64, 65)] == [False, True, True, False]
+    with pytest.raises(ValueError, match=r"^65 bytes is outside the execution table, 4 to 64 bytes$"):
+        known.execution_us(65)
+    linear = smallest().node_groups[0].node.execution
+    assert (linear.covered_bytes, linear.covers(0), linear.execution_us(0)) == ((0, math.inf), True, 30)
+
+
+@pytest.mark.parametrize(
+    ("servo", "grades", "words"),
+    [
+        ({}, ("assumed",), "assumed"),
+        ({"grade": "measured"}, ("measured",), "measured"),
+        ({"position_gain_per_s": 50, "x": {"drive_lag_us": 9}}, ("assumed", "assumed"), "assumed"),
+        (
+            # A lag of x, a gain of y, and a grade of each; a default that means none needs none.
+            {
+                "grade": "calibrated",
+                "x": {"drive_lag_us": 9},
+                "y": {"position_gain_per_s": 50},
+                "grades": {
+                    "drive_lag_us": "assumed",
+                    "position_gain_per_s": "published",
+                    "integral_gain_per_s2": "measured",
+                },
+            },
+            ("assumed", "published"),
+            "1 assumed, 1 published",
+        ),
+        ({"grade": "published", "grades": {"velocity_feedforward": "measured"}}, ("measured",), "measured"),
+    ],
+)
+def test_grades_of_a_servo_are_those_of_what_is_given(servo: Any, grades: tuple[str, ...], words: str) -> None:
+    found = profile(servo=servo).servo
+    assert found.grades_given == grades
+    assert found.grades_text == words
+    for axis in ("x", "y"):
+        own = {**{key: value for key, value in servo.items() if key == "position_gain_per_s"}, **servo.get(axis, {})}
+        keys = found.axis_keys(axis)
+        assert keys.items() >= own.items()
+        assert {key: keys[key] for key in keys.keys() - own.keys()} == {
+            key: value for key, value in smallest().servo.axis_keys(axis).items() if key not in own
+        }
+
+
+def test_the_circle_is_judged_by_the_tolerances_that_are_given() -> None:
+    assert not profile(tolerance__min_gain_margin_db=3).tolerance.judges_contour
+    judged = profile(tolerance={"circular_deviation_mm": 0.03, "mean_contour_error_mm": 0}).tolerance
+    assert judged.judged == ("mean_contour_error_mm", "circular_deviation_mm")
+    assert judged.judges_contour
+
+
+def test_the_nodes_that_vary_are_those_with_the_most_axes() -> None:
+    names = [varied_nodes(busplan.load_profile(name)).name for name in ("paper-4ms", "gantry-24")]
+    assert names == ["", "drives"]
+    more = busplan.load_profile("gantry-24", changes={"group.tool.nodes": 30})
+    assert varied_nodes(more).name == "tool"
 
 
 def test_a_converter_of_one_bit_is_refused() -> None:

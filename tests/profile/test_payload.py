@@ -83,6 +83,88 @@ def test_a_payload_needs_one_of_both_keys() -> None:
         assert "payload.read_bytes_per_axis = " in refused(f"read_bytes_per_axis = {wrong}\nwrite_bytes = 4")[0]
 
 
+@pytest.mark.parametrize(
+    ("payload", "read", "write", "follows"),
+    [
+        ("read_bytes = 12\nwrite_bytes = 8", ("read_bytes", 12), ("write_bytes", 8), False),
+        ("read_bytes_per_axis = 3\nwrite_bytes = 8", ("read_bytes_per_axis", 12), ("write_bytes", 8), True),
+        (
+            "read_bytes = 5\nread_bytes_per_axis = 2\nwrite_bytes = 0",
+            ("read_bytes_per_axis", 13),
+            ("write_bytes", 0),
+            True,
+        ),
+        (
+            "read_bytes = 1\nwrite_bytes = 1\nwrite_bytes_per_axis = 0",
+            ("read_bytes", 1),
+            ("write_bytes_per_axis", 1),
+            True,
+        ),
+    ],
+)
+def test_a_payload_is_changed_by_its_part_of_each_axis_first(
+    payload: str, read: tuple[str, int], write: tuple[str, int], follows: bool
+) -> None:
+    """Of a node with four axes."""
+    (nodes,) = profile(payload).node_groups
+    found = [(nodes.payload.key_of(kind), nodes.bytes_of(kind)) for kind in ("read", "write")]
+    assert found == [read, write]
+    assert [nodes.payload_key(kind) for kind in ("read", "write")] == [f"payload.{key}" for key, _ in (read, write)]
+    assert nodes.payload.follows_axes == follows
+    assert (nodes.nodes_key, nodes.node_key("execution.base_us")) == ("bus.nodes", "node.execution.base_us")
+
+
+@pytest.mark.parametrize(
+    ("payload", "problem"),
+    [
+        ("axes = 0\nread_bytes = 4\nwrite_bytes = 0", ""),
+        ("axes = 2\nread_bytes_per_axis = 4\nwrite_bytes_per_axis = 4", ""),
+        (
+            "axes = 0\nread_bytes = 4\nwrite_bytes_per_axis = 4",
+            "group.io.write_bytes_per_axis = 4: makes a payload of 0 bytes: the group has no axes; give write_bytes",
+        ),
+        (
+            "axes = 0\nread_bytes_per_axis = 4\nwrite_bytes = 1",
+            "group.io.read_bytes_per_axis = 4: makes a payload of 0 bytes: the group has no axes; give read_bytes",
+        ),
+        (
+            "axes = 3\nread_bytes_per_axis = 0\nwrite_bytes = 0",
+            (
+                "group.io.write_bytes = 0: makes 0 bytes, and so does what is read: nodes without data have no part in "
+                "the cycle; give read_bytes, write_bytes or both"
+            ),
+        ),
+    ],
+)
+def test_a_group_has_data_whatever_its_axes(payload: str, problem: str) -> None:
+    head = TEXT.partition("[payload]")[0].replace("nodes = 2\n", "")
+    text = f'{head}[[group]]\nname = "io"\nnodes = 1\n{payload}\n[group.execution]\n{LINE}\n'
+    Path("gantry.toml").write_text(text, encoding="utf-8")
+    if not problem:
+        (group,) = busplan.load_profile("gantry.toml").node_groups
+        keys = group.nodes_key, group.node_key("axes"), group.payload_key("read")
+        assert keys == ("group.io.nodes", "group.io.axes", f"group.io.{group.payload.key_of('read')}")
+        return
+    with pytest.raises(busplan.BusplanError) as caught:
+        busplan.load_profile("gantry.toml")
+    assert [message.partition(": ")[2] for message in caught.value.problems] == [problem]
+
+
+def test_nodes_are_alike_or_in_groups_and_not_both() -> None:
+    group = f'[[group]]\nname = "io"\nnodes = 1\naxes = 1\nread_bytes = 4\nwrite_bytes = 4\n[group.execution]\n{LINE}\n'
+    text = TEXT.format(payload="read_bytes = 4\nwrite_bytes = 4", execution=LINE) + group
+    Path("gantry.toml").write_text(text + group, encoding="utf-8")
+    with pytest.raises(busplan.BusplanError) as caught:
+        busplan.load_profile("gantry.toml")
+    own = "each [[group]] has its own; remove one of the two"
+    assert [message.partition(": ")[2] for message in caught.value.problems] == [
+        "bus.nodes = 2: this profile has groups; set group.NAME.nodes instead",
+        f"payload: {own}",
+        f"node: {own}",
+        'group[1].name = "io": there is a group of this name',
+    ]
+
+
 def test_one_direction_may_have_no_data_and_both_may_not() -> None:
     table = 'kind = "table"\npayload_bytes = [4, 16]\ntime_us = [36.7, 36.3]'
     assert profile("read_bytes_per_axis = 4\nwrite_bytes = 0", table)

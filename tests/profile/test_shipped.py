@@ -57,6 +57,17 @@ def test_a_file_beside_is_meant_by_its_near_name(tmp_path: Path) -> None:
         assert str(caught.value) == f"{tmp_path / typed}: no such file; did you mean {tmp_path / meant}?"
 
 
+def test_a_file_without_its_ending_is_meant_before_a_shipped_profile(work: Path) -> None:
+    def refused(name: str) -> str:
+        with pytest.raises(BusplanError) as caught:
+            load(name)
+        return str(caught.value)
+
+    assert refused("paper-4m").endswith("; did you mean paper-4ms?")
+    (work / "paper-4m.toml").touch()
+    assert refused("paper-4m") == "paper-4m: no such file; did you mean paper-4m.toml?"
+
+
 def test_a_shipped_profile_explains_its_keys() -> None:
     for name in SHIPPED:
         assert text_of(name).count("#") >= 5

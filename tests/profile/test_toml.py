@@ -244,6 +244,14 @@ def test_a_missing_section_of_a_group_has_the_header_that_the_file_needs() -> No
         f"group.io.execution: missing section [group.execution]; as one line, in its [[group]]: {EXECUTION}"
     )
     assert read(text + EXECUTION).name == "test"
+    linear = '[group.execution]\nkind = "linear"\nbase_us = -1\n'
+    assert [problem.partition(": ")[2] for problem in problems(text + linear)] == [
+        (
+            "group.io.execution.per_byte_us: missing key. Execution time per byte of payload [us/byte]; "
+            "for example per_byte_us = 0.35"
+        ),
+        "group.io.execution.base_us = -1: must be 0 or more",
+    ]
     assert the_problem(text.replace("[[group]]", "[group]") + EXECUTION).endswith(
         "group: expected an array of tables, each below [[group]]"
     )
@@ -258,6 +266,26 @@ def test_what_should_be_a_section_and_is_a_value_is_shown(value: str) -> None:
 @pytest.mark.parametrize(("old", "subject"), [("[bus]", "3:3: bus"), ("[node.execution]", "18:8: node.execution")])
 def test_an_array_of_tables_is_no_section_and_has_no_value_to_show(old: str, subject: str) -> None:
     assert the_problem(edited((old, f"[{old}]"))) == f"f.toml:{subject}: expected a table"
+
+
+@pytest.mark.parametrize(
+    ("adapter", "words"),
+    [
+        ('"x"', 'bus.adapter = "x": expected "ftdi", "ftdi-low-latency" or "none"'),
+        ("3", 'bus.adapter = 3: expected "ftdi", "ftdi-low-latency" or "none"'),
+        ("{timer_us = -1}", "bus.adapter.timer_us = -1: must be 0 or more"),
+        (
+            "{timer_us = 0, nothing = 1}",
+            "bus.adapter.nothing: unknown key; known here: timer_us, packet_bytes, frame_us",
+        ),
+        ("{}", "bus.adapter.timer_us: missing key. Latency timer; 0 where the adapter sends each answer at once"),
+    ],
+)
+def test_a_key_that_is_a_name_or_a_table_is_refused_as_what_it_is(adapter: str, words: str) -> None:
+    shipped = (Path(__file__).parents[2] / "profiles" / "dynamixel-arm-14.toml").read_text(encoding="utf-8")
+    text = shipped.replace("adapter = { timer_us = 2000 }", f"adapter = {adapter}")
+    (message,) = problems(text)
+    assert message.partition(": ")[2].startswith(words)
 
 
 @pytest.mark.parametrize(
@@ -427,6 +455,16 @@ def test_a_syntax_error_gives_one_message_with_its_place() -> None:
         assert abs(int(match[2]) - column) <= 2, problem
 
 
+def test_a_number_with_a_comma_or_a_sign_is_told_what_is_meant() -> None:
+    meant = {
+        "a = 1,5 # of 2": "; a number has a decimal point, not a comma: 1.5",
+        "a = 85 %": "; a share is a number without a sign: 0.85",
+        "a = 1 5": "",
+    }
+    for text, words in meant.items():
+        assert the_problem(f"b = 2\n{text}\n").partition("not valid TOML: ")[2].partition(";")[2] == words[1:]
+
+
 @pytest.mark.parametrize("text", ["a = [", "a = 1\nb = {x = 1", 'a = """', "a = [\n\n\n"])
 def test_a_file_that_ends_too_early_is_told_so(text: str) -> None:
     assert the_problem(text).endswith(", and the file ends")
@@ -518,6 +556,15 @@ def test_what_is_wrong_with_a_file_comes_placed() -> None:
     assert caught.value.placed == (
         PlacedProblem(7, 1, "out-of-range", "bus.nodes = 0: must be 1 or more", "bus.nodes", (9, 10)),
     )
+    # What is missing marks the table around it, at the top the first character; an unknown key marks itself.
+    with pytest.raises(PlacedError) as caught:
+        read(edited(('name = "test"', 'nme = "test"'), ("period_us = 4000\n", "")))
+    places = [(one.kind, one.key, one.line, one.column, one.marked) for one in caught.value.placed]
+    assert places == [
+        ("missing-key", "name", 1, 1, (1, 2)),
+        ("unknown-key", "nme", 2, 1, (1, 4)),
+        ("missing-key", "cycle.period_us", 8, 2, (2, 7)),
+    ]
     for content in (b"\xff", b"#" * (MAX_FILE_BYTES + 1), b"a", b"a = " + b"[" * 2000, b"a." * 21 + b"a = 1"):
         with pytest.raises(PlacedError) as caught:
             read(content)

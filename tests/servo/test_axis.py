@@ -298,7 +298,7 @@ def test_too_many_steps_are_refused() -> None:
 
 
 def test_an_encoder_too_fine_for_the_travel_is_refused() -> None:
-    setpoints = np.full(10, 1e7)
+    setpoints = np.linspace(0, -1e7, 10)
     with pytest.raises(BusplanError, match=r"too fine for 1e\+07 mm of travel; choose at least 4\.44e-09 mm"):
         simulate_axis(setpoints, axis=an_axis(encoder_resolution_mm=1e-9), timing=TIMING)
     # A drive may run away all the time: 1e6 mm/s for 10,000 periods of 1 ms.

@@ -61,6 +61,8 @@ def test_the_names_travel_between_processes() -> None:
         (50.0, 100.0, 50.0),
         (0.1 + 0.2, 0.1, 0.1),
         (747.3, 100.0, 74.73),
+        (1000.001, 20.0, 9.901),  # 101 x 9901 ns: from 51 steps on the last but one
+        (1000.003, 20.0, 1000.003 / 51),  # a prime number of ns
     ],
 )
 def test_the_step_is_the_longest_that_can_be_written(period_us: float, most_us: float, step_us: float) -> None:

@@ -13,7 +13,6 @@ from busplan.buses import kind_named, kind_names
 from busplan.errors import BusplanError
 from busplan.sections.base import Section, value_at
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
-from busplan.sourced import Sourced
 
 _Arrays: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
 """Tables of arrays by name, and the names, by identity of the array. They make look-ups among thousands fast."""
@@ -265,8 +264,6 @@ def words_of(profile: Profile, key: str) -> tuple[str, ...]:
 
 def _are_several(annotation: Any) -> bool:
     """Whether a key has several tables."""
-    if get_origin(annotation) is Annotated:
-        return _are_several(get_args(annotation)[0])
     return get_origin(annotation) is tuple
 
 
@@ -310,8 +307,6 @@ def profile_schema() -> dict[str, Any]:
             """Default of a key, also where it is a constant."""
             has_one = "default_factory" in schema and not schema.get("default_factory_takes_data")
             made = schema["default_factory"]() if has_one else None
-            if isinstance(made, Sourced):
-                return float(made)
             return made if isinstance(made, int | float) else super().get_default_value(schema)
 
     kinds = {kind: profile_model(kind) for kind in kind_names()}

@@ -9,7 +9,7 @@ from itertools import pairwise
 from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from busplan.elementwise import Number, choose, interpolated
 from busplan.english import plural
@@ -122,11 +122,6 @@ class LinearExecution(GradedExecution):
     base_us: TimeUs = Field(description="Execution time of an empty payload [us]", examples=[30])
     per_byte_us: TimeUs = Field(description="Execution time per byte of payload [us/byte]", examples=[0.35])
 
-    @property
-    def ascends_from_bytes(self) -> int:
-        """Payload from which no larger one takes less time [bytes]."""
-        return 0
-
     def execution_us(self, payload_bytes: Number) -> Number:
         """Execution time T_exec of a transaction [us]."""
         return self.base_us + self.per_byte_us * payload_bytes
@@ -152,14 +147,6 @@ class TableExecution(GradedExecution):
         if len(self.payload_bytes) != len(self.time_us):
             values = f"has {plural(len(self.time_us), 'value')} and payload_bytes has {len(self.payload_bytes)}"
             yield Problem(f"{values}: the two must be of one length", key="time_us", kind="inconsistent")
-
-    @property
-    def ascends_from_bytes(self) -> int:
-        """Payload from which no larger one takes less time [bytes]."""
-        falls = [
-            self.payload_bytes[at + 1] for at, (before, after) in enumerate(pairwise(self.time_us)) if after < before
-        ]
-        return falls[-1] if falls else 0
 
     @property
     def covered_bytes(self) -> tuple[float, float]:
@@ -295,6 +282,8 @@ class GroupSection(NodeSection, PayloadSection):
     They stand instead of `bus.nodes`, [node] and [payload]. A kind of bus extends its own node and payload by this
     section, and says `axes` again.
     """
+
+    model_config = ConfigDict(title="Group")
 
     name: GroupName = Field(description="Name of the group; its keys are group.NAME.key", examples=["drives"])
     nodes: Count = Field(description="Nodes of the group", examples=[2])
