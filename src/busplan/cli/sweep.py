@@ -27,15 +27,13 @@ from busplan.cli.options import (
 from busplan.cli.output import progress_bar, refuse_terminal, say, write_document
 from busplan.errors import BusplanError
 from busplan.extras import require_pyarrow
-from busplan.files import NewFile, new_file
+from busplan.files import new_file
 from busplan.forms import ENDINGS, ROWS_ENDINGS, Form, RowsForm
 from busplan.profile.changes import require_separate
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
     from contextlib import AbstractContextManager
-
-    from busplan.questions.sweep import SweepAnswer
 
 SweepForm = Literal[Form, RowsForm]
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
@@ -124,8 +122,10 @@ def sweep_command(
             refuse_terminal("parquet")
         require_pyarrow(form_typed(format_, output))
     require_apart({"--output": output}, inputs=profile_files(call.argument))
+    from busplan.forms.numbers import sentence_text
     from busplan.questions.base.arguments import load_network
-    from busplan.questions.sweep import checked_sweep, computed
+    from busplan.questions.base.sentences import changes_sentences
+    from busplan.questions.sweep import SHOWN, Digest, checked_sweep, computed, written_rows
 
     varied, model = parse_axes(vary or []), chosen_model(timing_model)
     for change, key in product(call.changes.entries, varied):
@@ -138,28 +138,24 @@ def sweep_command(
         unlimited=circle.unlimited,
         changes=call.changes,
     )
+    rows_form = ROWS_ENDINGS.get(f".{form}")
+    digest = Digest(sweep, most=0 if rows_form else sweep.rows if all_ else SHOWN)
+    changes = changes_sentences(sweep.changes)
     # Opened before the work, so that a path that cannot be written fails at once.
     with new_file(output, overwrite=True) if output else nullcontext() as file:
-        with progress_bar("sweep") as progress, circle.crew(points=sweep.grid.points) as crew:
-            answer = computed(sweep, executor=crew, progress=progress)
-        _write(answer, form, file, is_whole=all_)
+        with progress_bar("sweep", beside_stdout=bool(rows_form) and file is None) as progress:
+            with circle.crew(points=sweep.grid.points) as crew:
+                parts = computed(sweep, executor=crew, progress=progress)
+            if rows_form:
+                for piece in written_rows(rows_form, sweep, digest.counted(parts)):
+                    write_document(piece, file)
+            else:
+                digest.take(parts)
+        if not rows_form:
+            report = digest.report()
+            write_report(report._replace(blocks=(*changes, *report.blocks), is_whole=all_), form, file)
+    # On a terminal the report has them.
+    if rows_form or output is not None:
+        say(*map(sentence_text, (*changes, *digest.sentences())))
     if output is not None:
         say(f"wrote {output}")
-
-
-def _write(answer: "SweepAnswer", form: SweepForm, file: NewFile | None, *, is_whole: bool) -> None:
-    """Write all rows, or a report with the first; and say how much fits, unless the report has it."""
-    from busplan.forms.numbers import sentence_text
-    from busplan.questions.base.sentences import changes_sentences
-
-    changes = changes_sentences(answer.sweep.changes)
-    match form:
-        case "csv" | "json" | "parquet":
-            for piece in answer.rows_in(form):
-                write_document(piece, file)
-        case _:
-            report = answer.report(most=None) if is_whole else answer.report()
-            write_report(report._replace(blocks=(*changes, *report.blocks), is_whole=is_whole), form, file)
-            if file is None:
-                return
-    say(*map(sentence_text, (*changes, *answer.sentences())))

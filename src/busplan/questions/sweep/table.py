@@ -1,11 +1,11 @@
-"""A sweep, checked, and its table: the figures of `capacity` for many profiles at once.
+"""A sweep, checked, and its table part by part: the figures of `capacity` for many profiles at once.
 
 The functions of `capacity` accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie
-along an axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are
-added here.
+along an axis of their own, so that a figure is computed, and written, only over the keys that it depends on. Figures in
+words are added here.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial, reduce
 from math import prod
 from typing import Final, NamedTuple
@@ -31,19 +31,41 @@ from busplan.questions.sweep.values import axis_values, checked_grid, grid_model
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile, varied_nodes
 
-CHUNK_POINTS: Final = 1 << 14
-"""Points computed at once: their arrays fit into the processor's cache."""
-
+_PART_CELLS: Final = 1_000_000
+"""Most cells of a part: as text they take up to a hundred megabytes."""
 MOST_CELLS: Final = 200_000_000
-"""Most cells of the table, of eight bytes each: a million points of one kind of nodes, fewer of many groups."""
+"""Most cells of the table: a million points of one kind of nodes, fewer of many groups. As text it has gigabytes."""
 MOST_GROUPS: Final = 128
 """Most groups, enough for each node of CANopen: the most nodes of each are searched, and each search counts all."""
 
 Columns = dict[str, Array]
-"""Columns by name, a row for each point and timing model, each of shape (rows,).
+"""Columns by name.
 
 Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
 """
+
+
+class Part(NamedTuple):
+    """The table of a contiguous part of the grid."""
+
+    shape: tuple[int, ...]
+    """Points along each axis of the grid."""
+    by_model: tuple[Columns, ...]
+    """Columns under each timing model, which broadcast to the shape."""
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return prod(self.shape)
+
+    def count(self, flags: Array) -> int:
+        """Number of points with a flag."""
+        return int(np.count_nonzero(np.broadcast_to(flags, self.shape)))
+
+    def column(self, name: str, write: Callable[[Array], Array] = np.asarray) -> Array:
+        """A column, a row for each point and timing model, of shape (rows,); `write` changes its different values."""
+        by_model = [np.broadcast_to(write(columns[name]), self.shape).ravel() for columns in self.by_model]
+        return np.stack(by_model, axis=1).ravel()
 
 
 class Sweep(NamedTuple):
@@ -74,6 +96,11 @@ class Sweep(NamedTuple):
             *figure_names(self.profile, self.bus_figures),
             *(CIRCLE_COLUMNS if self.circle else ()),
         )
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.grid.points * len(self.timing_models)
 
 
 def checked_sweep(
@@ -133,32 +160,21 @@ def column_figures(sweep: Sweep) -> dict[str, Figure]:
     return {**figures, **groups}
 
 
-def figure_table(sweep: Sweep, *, progress: Progress = ignored) -> Columns:
-    """All figures of `capacity` over the grid of a sweep.
+def parts_of(sweep: Sweep, *, progress: Progress = ignored) -> Iterator[Part]:
+    """All figures of `capacity` over the grid of a sweep, part by part in its order.
 
     References
     ----------
     Paper, equations (1)-(11).
     """
     grid, profile = sweep.grid, sweep.profile
-    names = (*grid.axes, *figure_names(profile, sweep.bus_figures))
-    parts: list[Columns] = []
     done = 0
-    for chunk in grid.chunks(CHUNK_POINTS):
-        by_model = [
-            {**chunk.values, **_figures(profile, chunk.values, model, group=sweep.group)}
-            for model in sweep.timing_models
-        ]
-        parts.append({name: _interleaved([columns[name] for columns in by_model], chunk.shape) for name in names})
-        done += prod(chunk.shape)
+    for chunk in grid.chunks(max(1, _PART_CELLS // (len(sweep.columns) * len(sweep.timing_models)))):
+        by_model = (_figures(profile, chunk.values, model, group=sweep.group) for model in sweep.timing_models)
+        part = Part(chunk.shape, tuple({**chunk.values, **figures} for figures in by_model))
+        yield part
+        done += part.points
         progress(done, grid.points)
-    # A part lets go of a column when it is in the table.
-    return {name: np.concatenate([part.pop(name) for part in parts]) for name in names}
-
-
-def _interleaved(by_model: Sequence[Array], shape: tuple[int, ...]) -> Array:
-    """Arrays that broadcast to a shape, one for each timing model: point by point, and for each model by model."""
-    return np.stack([np.broadcast_to(column, shape).ravel() for column in by_model], axis=1).ravel()
 
 
 def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group: str) -> dict[str, Array]:
