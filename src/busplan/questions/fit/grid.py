@@ -81,17 +81,22 @@ class Grid(NamedTuple):
         """Chunks of the grid in row-major order, of at most `most` points."""
         import numpy as np
 
-        # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
-        cut = next(number for number in range(len(self.shape) + 1) if prod(self.shape[number + 1 :]) <= most)
-        width = max(1, most // prod(self.shape[cut + 1 :]))
-        parts = [
-            *([slice(index, index + 1) for index in range(size)] for size in self.shape[:cut]),
-            *([slice(begin, begin + width) for begin in range(0, size, width)] for size in self.shape[cut : cut + 1]),
-            *([slice(size)] for size in self.shape[cut + 1 :]),
-        ]
-        for part in product(*parts):
-            values = [axis[places] for axis, places in zip(self.axes.values(), part, strict=True)]
+        for places in cuts(self.shape, most):
+            values = [axis[place] for axis, place in zip(self.axes.values(), places, strict=True)]
             yield Chunk(tuple(map(len, values)), dict(zip(self.axes, np.ix_(*values), strict=True)))
+
+
+def cuts(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
+    """Slices that cut an array of a shape into parts of at most `most` elements, in row-major order."""
+    # The axis to cut: a part has all values of the axes after it and one value of each axis before it.
+    cut = next(number for number in range(len(shape) + 1) if prod(shape[number + 1 :]) <= most)
+    width = max(1, most // prod(shape[cut + 1 :]))
+    places = [
+        *([slice(index, index + 1) for index in range(size)] for size in shape[:cut]),
+        *([slice(begin, min(begin + width, size)) for begin in range(0, size, width)] for size in shape[cut : cut + 1]),
+        *([slice(0, size)] for size in shape[cut + 1 :]),
+    ]
+    return product(*places)
 
 
 class GridPoint(NamedTuple):

@@ -291,7 +291,9 @@ def _with_circles(sweep: Sweep, results: Array) -> Iterator[Part]:
     for part in parts_of(sweep):
         here = results[:, done : done + part.points]
         done += part.points
-        circles = {name: _typed(name, values).reshape(part.shape) for name, values in zip(CIRCLE_COLUMNS, here, strict=True)}
+        circles = {
+            name: _typed(name, values).reshape(part.shape) for name, values in zip(CIRCLE_COLUMNS, here, strict=True)
+        }
         yield part._replace(by_model=tuple({**columns, **circles} for columns in part.by_model))
 
 

@@ -22,9 +22,12 @@ from busplan.questions.sweep.table import Part, Sweep, column_figures
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_TEXT_CELLS: Final = 250_000
+"""Most cells that are text at once: they take tens of megabytes."""
 _GROUP_ROWS: Final = 1 << 16
-"""Least rows of a row group of Parquet: readers skip and share out whole groups."""
-
+"""Least rows of a row group of Parquet, but for the last: readers skip and share out whole groups."""
+_GROUP_CELLS: Final = 4_000_000
+"""Cells of a row group, whose rows are fewer in a wide table."""
 _NUMBERS: Final = {int, float}
 
 
@@ -46,7 +49,8 @@ def written_rows(form: RowsForm, sweep: Sweep, parts: Iterable[Part]) -> Iterato
     if form == "parquet":
         yield from _parquet(sweep, parts)
         return
-    for text in (_csv if form == "csv" else _json)(sweep, parts):
+    pieces = (piece for part in parts for piece in part.cut(_TEXT_CELLS // sweep.point_cells))
+    for text in (_csv if form == "csv" else _json)(sweep, pieces):
         yield text.encode("utf-8", "backslashreplace")
 
 
@@ -175,10 +179,11 @@ def _parquet(sweep: Sweep, parts: Iterable[Part]) -> Iterator[bytes]:
 
 def _groups(sweep: Sweep, parts: Iterable[Part]) -> Iterator[list[Part]]:
     """Parts that together have the rows of a row group; the last have the rest."""
+    least = min(_GROUP_ROWS, _GROUP_CELLS // len(sweep.columns)) // len(sweep.timing_models)
     group: list[Part] = []
     for part in parts:
         group.append(part)
-        if sum(part.points for part in group) * len(sweep.timing_models) >= _GROUP_ROWS:
+        if sum(part.points for part in group) >= least:
             yield group
             group = []
     if group:

@@ -7,6 +7,7 @@ words are added here.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial, reduce
+from itertools import chain
 from math import prod
 from typing import Final, NamedTuple
 
@@ -23,7 +24,7 @@ from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import VERDICTS, verdict_code
 from busplan.questions.fit.figures import COUNTS, TYPES, fit_numbers
-from busplan.questions.fit.grid import Array, Grid
+from busplan.questions.fit.grid import Array, Grid, cuts
 from busplan.questions.fit.most_nodes import MostNodes, most_and_safe_nodes
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
@@ -31,8 +32,10 @@ from busplan.questions.sweep.values import axis_values, checked_grid, grid_model
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile, varied_nodes
 
-_PART_CELLS: Final = 1_000_000
-"""Most cells of a part: as text they take up to a hundred megabytes."""
+_PART_POINTS: Final = 1 << 14
+"""Most points computed at once: their arrays fit into the processor's cache."""
+_PART_CELLS: Final = 8_000_000
+"""Most cells computed at once, of eight bytes each."""
 MOST_CELLS: Final = 200_000_000
 """Most cells of the table: a million points of one kind of nodes, fewer of many groups. As text it has gigabytes."""
 MOST_GROUPS: Final = 128
@@ -57,6 +60,21 @@ class Part(NamedTuple):
     def points(self) -> int:
         """Number of points."""
         return prod(self.shape)
+
+    def cut(self, most: int) -> "Iterator[Part]":
+        """Smaller parts, of at most `most` points, or of one."""
+        for places in cuts(self.shape, max(1, most)):
+
+            def at(values: Array, places: Sequence[slice] = places) -> Array:
+                # What does not depend on a key has one value along its axis.
+                return values[
+                    tuple(place if size > 1 else slice(1) for place, size in zip(places, values.shape, strict=True))
+                ]
+
+            shape = tuple(place.stop - place.start for place in places)
+            yield Part(
+                shape, tuple({name: at(column) for name, column in columns.items()} for columns in self.by_model)
+            )
 
     def count(self, flags: Array) -> int:
         """Number of points with a flag."""
@@ -102,6 +120,11 @@ class Sweep(NamedTuple):
         """Number of rows."""
         return self.grid.points * len(self.timing_models)
 
+    @property
+    def point_cells(self) -> int:
+        """Cells of a point."""
+        return len(self.columns) * len(self.timing_models)
+
 
 def checked_sweep(
     network: Network,
@@ -135,7 +158,7 @@ def _require_few_cells(sweep: Sweep) -> None:
         raise BusplanError(
             f"{sweep.profile.name}: {groups:,} groups are more than the {MOST_GROUPS:,} a sweep takes; join like groups"
         )
-    most = MOST_CELLS // (columns * len(sweep.timing_models))
+    most = MOST_CELLS // sweep.point_cells
     if sweep.grid.points > most:
         raise ArgumentError(
             f"vary: {sweep.grid.points:,} points of {columns:,} columns are too many for a sweep; vary "
@@ -169,7 +192,7 @@ def parts_of(sweep: Sweep, *, progress: Progress = ignored) -> Iterator[Part]:
     """
     grid, profile = sweep.grid, sweep.profile
     done = 0
-    for chunk in grid.chunks(max(1, _PART_CELLS // (len(sweep.columns) * len(sweep.timing_models)))):
+    for chunk in grid.chunks(min(_PART_POINTS, _PART_CELLS // sweep.point_cells)):
         by_model = (_figures(profile, chunk.values, model, group=sweep.group) for model in sweep.timing_models)
         part = Part(chunk.shape, tuple({**chunk.values, **figures} for figures in by_model))
         yield part
@@ -181,16 +204,32 @@ def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group
     """All figures of a chunk under one timing model; they broadcast to its shape."""
     for place, (key, axis) in enumerate(values.items()):
         if axis.dtype == object and axis.size > 1:
-            # Words among numbers: compute each value by itself and join the results along the axis.
+            # Words among numbers: compute each word by itself, and join the results along the axis.
+            alike = _numbers_and_words(axis.ravel().tolist())
             parts = [
-                _figures(profile, {**values, key: np.take(axis, [index], axis=place)}, model, group=group)
-                for index in range(axis.size)
+                _figures(profile, {**values, key: _taken(axis, indices, place)}, model, group=group)
+                for indices in alike
             ]
-            return {name: _joined([part[name] for part in parts], axis=place) for name in parts[0]}
+            order = np.argsort([*chain(*alike)])
+            return {
+                name: np.take(_joined([part[name] for part in parts], axis=place), order, place) for name in parts[0]
+            }
     at_points = {key: axis.item() if axis.size == 1 else axis.astype(float) for key, axis in values.items()}
     figures = _columns(network_of(with_all_unchecked(profile, at_points)), model, group=group)
     one = (1,) * len(values)
     return {name: column.reshape(one) if column.size == 1 else column for name, column in figures.items()}
+
+
+def _numbers_and_words(values: Sequence[object]) -> list[list[int]]:
+    """Places of the numbers, together, and of each word."""
+    is_word = [isinstance(value, str | bool) for value in values]
+    numbers = [place for place, word in enumerate(is_word) if not word]
+    return [*([numbers] if numbers else []), *([place] for place, word in enumerate(is_word) if word)]
+
+
+def _taken(axis: Array, indices: list[int], place: int) -> Array:
+    taken: Array = np.take(axis, indices, axis=place)
+    return taken.astype(float) if len(indices) > 1 else taken
 
 
 def _joined(parts: list[Array], *, axis: int) -> Array:
