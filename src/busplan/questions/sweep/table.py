@@ -210,10 +210,7 @@ def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group
                 _figures(profile, {**values, key: _taken(axis, indices, place)}, model, group=group)
                 for indices in alike
             ]
-            order = np.argsort([*chain(*alike)])
-            return {
-                name: np.take(_joined([part[name] for part in parts], axis=place), order, place) for name in parts[0]
-            }
+            return {name: _joined([part[name] for part in parts], alike, axis=place) for name in parts[0]}
     at_points = {key: axis.item() if axis.size == 1 else axis.astype(float) for key, axis in values.items()}
     figures = _columns(network_of(with_all_unchecked(profile, at_points)), model, group=group)
     one = (1,) * len(values)
@@ -232,9 +229,12 @@ def _taken(axis: Array, indices: list[int], place: int) -> Array:
     return taken.astype(float) if len(indices) > 1 else taken
 
 
-def _joined(parts: list[Array], *, axis: int) -> Array:
-    shape = np.broadcast_shapes(*(part.shape for part in parts))
-    return np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=axis)
+def _joined(parts: Sequence[Array], places: Sequence[list[int]], *, axis: int) -> Array:
+    """One array of parts, each with its places along an axis."""
+    rest = np.broadcast_shapes(*(part.take([0], axis).shape for part in parts))
+    shapes = ((*rest[:axis], len(own), *rest[axis + 1 :]) for own in places)
+    joined = np.concatenate([np.broadcast_to(part, shape) for part, shape in zip(parts, shapes, strict=True)], axis)
+    return joined.take(np.argsort([*chain(*places)]), axis)
 
 
 def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
