@@ -60,7 +60,7 @@ class _Circle:
         ),
     ] = None
     unlimited: Annotated[
-        bool, typer.Option("--unlimited", help="Run more than 1,000 circle tests, which --circle alone refuses.")
+        bool, typer.Option("--unlimited", help="Run up to 100,000 circle tests; --circle alone runs 1,000.")
     ] = False
 
     def __post_init__(self) -> None:
@@ -111,8 +111,8 @@ def sweep_command(
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
     Each row has the figures of `busplan capacity` for one point, of a million at most: a table for pandas, polars or
-    duckdb, which sort, group and draw it. Ctrl-C, SIGTERM and SIGHUP leave FILE as it was. Exits 0 whatever the
-    verdict.
+    duckdb, which sort, group and draw it. A million points of IEEE 1394 take a minute and 1.2 GB of CSV, or 140 MB of
+    Parquet. Ctrl-C, SIGTERM and SIGHUP leave FILE as it was. Exits 0 whatever the verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 -o nodes.csv
     """
@@ -151,10 +151,11 @@ def sweep_command(
                     write_document(piece, file)
             else:
                 digest.take(parts)
-        if not rows_form:
-            report = digest.report()
-            write_report(report._replace(blocks=(*changes, *report.blocks), is_whole=all_), form, file)
-    # On a terminal the report has them.
+        match form:
+            case "table" | "markdown" | "html":
+                report = digest.report()
+                write_report(report._replace(blocks=(*changes, *report.blocks), is_whole=all_), form, file)
+    # The report on standard output has them.
     if rows_form or output is not None:
         say(*map(sentence_text, (*changes, *digest.sentences())))
     if output is not None:

@@ -223,13 +223,13 @@ def sweep(
     circle
         Also run the circle test of every point, and add its columns (errors in mm, margins).
     unlimited
-        Allow more than 1,000 circle tests.
+        Allow up to 100,000 circle tests, not 1,000.
     executor
         With `circle`: where the tests run, in chunks of about a second; by default in this thread. Any
         `concurrent.futures.Executor` gives the same answer, and is not shut down. Worker processes must have this
         version of busplan.
     progress
-        Called now and then with the points, or the circle tests, that are done, and all of them [1].
+        Called now and then with the part that is done, and the whole.
 
     Returns
     -------

@@ -9,6 +9,7 @@ import numpy as np
 
 from busplan.buses.figure import EXCEEDED, TIMING_MODEL, VERDICT, Figure
 from busplan.english import nouns
+from busplan.errors import BusplanError
 from busplan.forms import blocks
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.sweep.rows import first_rows
@@ -32,6 +33,9 @@ _RANKS: Final[Mapping[str, int]] = MappingProxyType(
 _OF_CIRCLES: Final = (*("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed"),)
 """Default figures of circle tests."""
 
+_MOST_SHOWN: Final = 10_000
+"""Most rows of a report."""
+
 
 def default_columns(sweep: Sweep) -> tuple[str, ...]:
     """Default figures of a table, with the safe nodes of each group.
@@ -48,7 +52,12 @@ class Digest:
     """Counts of a sweep's points, and its first rows, gathered while its parts go by."""
 
     def __init__(self, sweep: Sweep, *, most: int) -> None:
-        """Gather up to `most` rows."""
+        """Gather up to `most` rows. BusplanError: a report does not show so many."""
+        if min(most, sweep.rows) > _MOST_SHOWN:
+            raise BusplanError(
+                f"{sweep.rows:,} rows are more than the {_MOST_SHOWN:,} that a report shows; CSV, JSON and Parquet "
+                "have every row"
+            )
         self._sweep, self._most = sweep, most
         self._columns = (*sweep.grid.axes, TIMING_MODEL.key, *default_columns(sweep))
         self._rows: list[blocks.Record] = []

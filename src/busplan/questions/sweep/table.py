@@ -144,8 +144,8 @@ def checked_sweep(
     grid = checked_grid(profile, axes, with_circle=circle)
     models = grid_models(network, grid, timing_models)
     varied = varied_nodes(profile).name if profile.group else ""
-    if circle and not unlimited:
-        require_few(grid)
+    if circle:
+        require_few(grid, unlimited=unlimited)
     sweep = Sweep(profile, bus.figures, bus.safety, bus.deciding_model, grid, models, varied, circle, changes)
     _require_few_cells(sweep)
     return sweep
