@@ -20,7 +20,7 @@ from busplan.questions.fit.figures import (
 from busplan.questions.fit.most_nodes import most_and_safe_nodes
 from busplan.questions.fit.network import changed, model_names, trial
 from busplan.sections.machine import ProfileGroup
-from busplan.sections.profile import varied_nodes
+from busplan.sections.profile import Profile, varied_nodes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,9 +37,14 @@ MOST_TABLES: Final = 50_000
 """Most groups and messages of all settings of a picture together."""
 
 
+def tables_in(profile: Profile) -> int:
+    """Number of groups and messages of a profile."""
+    return len(profile.node_groups) + len(getattr(profile, "message", ()))
+
+
 def require_few_tables(network: Network, *, settings: int, most: int = MOST_TABLES) -> None:
     """Refuse a grid whose settings all together have too many groups and messages."""
-    tables = len(network.profile.node_groups) + len(getattr(network.profile, "message", ()))
+    tables = tables_in(network.profile)
     if settings * tables > most:
         raise BusplanError(
             f"{settings:,} settings of {tables:,} groups and messages take too long: give values for up to "

@@ -5,6 +5,7 @@ along an axis of their own, so that a figure is computed, and written, only over
 words are added here.
 """
 
+import gc
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial, reduce
 from itertools import chain
@@ -24,7 +25,7 @@ from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import VERDICTS, verdict_code
 from busplan.questions.fit.figures import COUNTS, TYPES, fit_numbers
-from busplan.questions.fit.grid import Array, Grid, cuts
+from busplan.questions.fit.grid import Array, Grid, cuts, require_few_tables, tables_in
 from busplan.questions.fit.most_nodes import MostNodes, most_and_safe_nodes
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
@@ -36,8 +37,12 @@ _PART_POINTS: Final = 1 << 14
 """Most points computed at once: their arrays fit into the processor's cache."""
 _PART_CELLS: Final = 8_000_000
 """Most cells computed at once, of eight bytes each."""
+_TABLE_CELLS: Final = 20
+"""Numbers of each group or message at a point while its figures are computed, about."""
 MOST_CELLS: Final = 200_000_000
 """Most cells of the table: a million points of one kind of nodes, fewer of many groups. As text it has gigabytes."""
+_MOST_TABLES: Final = 20_000_000
+"""Most groups and messages of all points together: minutes of work."""
 MOST_GROUPS: Final = 128
 """Most groups, enough for each node of CANopen: the most nodes of each are searched, and each search counts all."""
 
@@ -148,6 +153,7 @@ def checked_sweep(
         require_few(grid, unlimited=unlimited)
     sweep = Sweep(profile, bus.figures, bus.safety, bus.deciding_model, grid, models, varied, circle, changes)
     _require_few_cells(sweep)
+    require_few_tables(network, settings=grid.points, most=_MOST_TABLES)
     return sweep
 
 
@@ -192,12 +198,15 @@ def parts_of(sweep: Sweep, *, progress: Progress = ignored) -> Iterator[Part]:
     """
     grid, profile = sweep.grid, sweep.profile
     done = 0
-    for chunk in grid.chunks(min(_PART_POINTS, _PART_CELLS // sweep.point_cells)):
+    point_cells = max(sweep.point_cells, _TABLE_CELLS * tables_in(profile))
+    for chunk in grid.chunks(max(1, min(_PART_POINTS, _PART_CELLS // point_cells))):
         by_model = (_figures(profile, chunk.values, model, group=sweep.group) for model in sweep.timing_models)
         part = Part(chunk.shape, tuple({**chunk.values, **figures} for figures in by_model))
         yield part
         done += part.points
         progress(done, grid.points)
+        # The events of a cycle refer to it, and Python counts objects, not the size of the arrays that they hold.
+        gc.collect()
 
 
 def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group: str) -> dict[str, Array]:
