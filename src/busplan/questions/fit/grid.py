@@ -201,12 +201,15 @@ def _counts(points: Sequence[GridPoint], group: ProfileGroup, *, model: str) -> 
 
 
 def _in_arrays(points: Sequence[GridPoint], *, without: str = "") -> Iterator[tuple[list[int], Network]]:
-    """Networks that stand for several points, in arrays where a kind has them: the places of the points, and each."""
+    """Networks that stand for several points: the places of the points, and each.
+
+    They hold arrays, but where nodes are counted, whose key is `without`, only of a kind that counts them in arrays.
+    """
     alike: dict[object, list[int]] = {}
     for place, point in enumerate(points):
         # What is no number is the same at all points of an array.
         words = tuple((key, None if _is_number(value) else value) for key, value in point.without(without))
-        alike.setdefault(words if has_arrays(point.network) else place, []).append(place)
+        alike.setdefault(words if not without or has_arrays(point.network) else place, []).append(place)
     for places in alike.values():
         first = points[places[0]]
         if len(places) == 1:
