@@ -80,3 +80,10 @@ def test_of_groups_it_is_said_which_one_varies() -> None:
     swept = busplan.sweep("gantry-24", vary={"cycle.period_us": [500, 1000]})
     assert sentences_of(swept)[1] == "Axes are counted with more nodes of drives, with the other groups unchanged."
     assert shown(swept.report(), "group.drives.safe_nodes") == swept["group.drives.safe_nodes"].tolist()
+
+
+def test_a_report_shows_no_more_rows_than_one_reads() -> None:
+    swept = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(5001)})
+    assert "20 of 10,002 rows." in str(swept)
+    with pytest.raises(busplan.BusplanError, match=r"^10,002 rows are more than the 10,000 that a report shows; CSV"):
+        swept.report(most=None)
