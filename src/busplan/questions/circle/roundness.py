@@ -223,13 +223,7 @@ def run_circles(
 
 
 def _require_few(networks: Sequence[Network]) -> None:
-    """Refuse circles that are held in memory together, and are longer than one may be.
-
-    Raises
-    ------
-    BusplanError
-        Their set-points or steps are too many.
-    """
+    """Refuse circles that are held in memory together, and are longer than one may be."""
     for what, count, most in (("set-points", path_setpoints, MAX_SETPOINTS), ("steps", path_steps, MAX_STEPS)):
         together = sum(map(count, networks))
         if together > most:
