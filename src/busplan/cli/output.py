@@ -175,15 +175,19 @@ _PATIENCE_S: Final = 1.0
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator["Progress"]:
-    """Give a function that takes the work done and the total work, and shows both if stderr is a terminal."""
+def progress_bar(title: str, *, beside_stdout: bool = False) -> Iterator["Progress"]:
+    """Give a function that takes the work done and the total work, and shows both if stderr is a terminal.
+
+    `beside_stdout`: standard output is written meanwhile, so that a bar would stand among its lines on a terminal.
+    """
     started = monotonic()
+    is_seen = sys.stderr.isatty() and not (beside_stdout and sys.stdout.isatty())
     bar: Bar | None = None
 
     def report(done: int, total: int) -> None:
         nonlocal bar
         if bar is None:
-            if not sys.stderr.isatty() or monotonic() - started < _PATIENCE_S:
+            if not is_seen or monotonic() - started < _PATIENCE_S:
                 return
             from rich.console import Console
             from rich.progress import Progress

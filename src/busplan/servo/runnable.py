@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Refused
 
-MAX_SETPOINTS = 5_000_000
-"""Most set-points of a move, 1.4 h at 1 ms; more take over 500 MB."""
-MAX_STEPS = 40_000_000
-"""Positions of two axes, and what is computed from them, take 1.3 GB."""
+MAX_SETPOINTS = 1_000_000
+"""Most set-points of a move, 17 minutes at 1 ms; they take 200 MB."""
+MAX_STEPS = 12_000_000
+"""Most steps of a move: positions of two axes, and what is computed from them, take 220 MB."""
 LONGEST_SETTLING_US = 60e6
 """Longest lead-in in which loops may settle [us]."""
 

@@ -306,6 +306,10 @@ def test_a_bus_that_does_not_fit_needs_no_path(small: busplan.Profile) -> None:
         ({"delivery.jitter_us": 1500}, "jitter_us = 1500"),
         ({"servo.y.max_velocity_mm_s": 10}, "axis y reaches"),
         ({"servo.step_us": 0.001}, "step_us = 0.001"),
+        (
+            {"servo.step_us": 0.4},
+            r"circles of 2 periods take [0-9,]{10} steps together, more than 12,000,000; give fewer",
+        ),
     ],
 )
 def test_all_periods_are_checked_before_the_first_is_simulated(

@@ -220,6 +220,11 @@ def test_what_makes_no_sweep_is_refused() -> None:
         ),
         ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without unlimited=True"),
         (
+            {"cycle.period_us": range(1, 100_002)},
+            {"circle": True, "unlimited": True},
+            "circle=True: 100,001 points are more circle tests than the 100,000 that a sweep takes; vary less",
+        ),
+        (
             {"circle.feed_mm_per_min": [1000.0, 500_000.0]},
             {"circle": True},
             "circle.feed_mm_per_min = 500000.0: axis x reaches 23965.7 mm/min",
@@ -246,3 +251,14 @@ def test_many_groups_allow_fewer_points(groups: int, points: int, message: str, 
     (tmp_path / "many.toml").write_text("\n".join(lines))
     with pytest.raises(busplan.BusplanError, match=re.escape(message)):
         busplan.sweep(tmp_path / "many.toml", vary={"cycle.period_us": f"1000:20000:#{points}"})
+
+
+def test_many_messages_allow_fewer_points(tmp_path: Path) -> None:
+    lines = ["schema_version = 1", 'name = "many"', "[bus]", 'kind = "can"', "bit_rate_kbit_s = 1000"]
+    for number in range(400):
+        lines += ["[[message]]", f'name = "m{number}"', f"identifier = {number}", "payload_bytes = 8"]
+        lines += ["period_us = 100000"]
+    (tmp_path / "many.toml").write_text("\n".join(lines))
+    words = "50,001 settings of 400 groups and messages take too long: give values for up to 50,000 settings"
+    with pytest.raises(busplan.BusplanError, match=words):
+        busplan.sweep(tmp_path / "many.toml", vary={"bus.bit_rate_kbit_s": "500:1000:#50001"})

@@ -59,8 +59,9 @@ def test_the_summary_counts_points_under_each_model(answer: busplan.SweepAnswer,
 
 def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     # Two hops need 7: 0 to 6 are unsafe.
-    answer = busplan.sweep("paper-4ms", vary={"bus.gap_count": range(64)})
-    assert sentences_of(answer)[-1] == "At 7 points the gap count is unsafe (gap_count_safe)."
+    # The period, which it does not depend on, counts each twice.
+    answer = busplan.sweep("paper-4ms", vary={"bus.gap_count": range(64), "cycle.period_us": (1000, 2000)})
+    assert sentences_of(answer)[-1] == "At 14 points the gap count is unsafe (gap_count_safe)."
     assert answer.sentences()[-1].state == "warns"
     one = busplan.sweep("paper-4ms", vary={"bus.gap_count": [6, 7]})
     assert sentences_of(one)[-1] == "At 1 point the gap count is unsafe (gap_count_safe)."
@@ -80,3 +81,10 @@ def test_of_groups_it_is_said_which_one_varies() -> None:
     swept = busplan.sweep("gantry-24", vary={"cycle.period_us": [500, 1000]})
     assert sentences_of(swept)[1] == "Axes are counted with more nodes of drives, with the other groups unchanged."
     assert shown(swept.report(), "group.drives.safe_nodes") == swept["group.drives.safe_nodes"].tolist()
+
+
+def test_a_report_shows_no_more_rows_than_one_reads() -> None:
+    swept = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(5001)})
+    assert "20 of 10,002 rows." in str(swept)
+    with pytest.raises(busplan.BusplanError, match=r"^10,002 rows are more than the 10,000 that a report shows; CSV"):
+        swept.report(most=None)

@@ -8,9 +8,12 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import busplan
+from busplan.questions.base.arguments import load_network
+from busplan.questions.sweep import checked_sweep, computed, written_rows
 from tests.extras import needed
 
 GRIDS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -64,12 +67,33 @@ def test_what_does_not_exist_is_null_and_empty(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_thousand_pieces_are_one_table(tmp_path: Path) -> None:
-    answer = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(20_000)}, timing_model="paper")
-    rows = list(csv.DictReader(io.StringIO(saved(answer, tmp_path / "rows.csv").decode())))
-    assert [int(row["cycle.nonperiodic_us"]) for row in rows] == list(range(20_000))
-    assert [float(row["margin_us"]) for row in rows] == answer["margin_us"].tolist()
-    assert [row["margin_us"] for row in answer.to_dict()["rows"]] == answer["margin_us"].tolist()
+def test_a_long_table_is_made_of_short_ones(tmp_path: Path) -> None:
+    # More points than are computed or written at once.
+    vary = {"cycle.nonperiodic_us": range(8500)}
+    whole = busplan.sweep("paper-4ms", vary={"bus.nodes": (1, 17), **vary}, timing_model="paper")
+    lines = saved(whole, tmp_path / "rows.csv").decode().splitlines()
+    short = [busplan.sweep("paper-4ms", vary={"bus.nodes": [n], **vary}, timing_model="paper") for n in (1, 17)]
+    assert lines[1:] == [
+        line for answer in short for line in saved(answer, tmp_path / "rows.csv").decode().splitlines()[1:]
+    ]
+    fitting = sum(int(answer["fits"].sum()) for answer in short)
+    assert 0 < fitting < 17_000
+    assert str(whole).startswith(f"paper-4ms: 17,000 points; {fitting:,} fit by the paper model.")
+    assert [row["margin_us"] for row in whole.to_dict()["rows"]] == whole["margin_us"].tolist()
+
+
+@pytest.mark.parametrize("form", ["csv", "json", pytest.param("parquet", marks=pytest.mark.slow)])
+def test_the_first_rows_are_written_before_the_last_are_computed(form: Any) -> None:
+    if form == "parquet":
+        needed("pyarrow")
+    network = load_network(busplan.load_profile("paper-4ms"))
+    vary = {"cycle.nonperiodic_us": np.arange(100_000)}
+    sweep = checked_sweep(network, vary, timing_models=["paper"], circle=False, unlimited=False)
+    done = [0]
+    pieces = written_rows(form, sweep, computed(sweep, progress=lambda now, _: done.append(now)))
+    assert next(pieces)
+    assert done[-1] < 100_000
+    pieces.close()  # type: ignore[attr-defined]
 
 
 # --- Parquet ----------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Network
+from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer, Contribution, telling_measures
 from busplan.questions.circle.failures import bus_failures, circle_failures, tightest_margins
@@ -24,6 +25,7 @@ from busplan.questions.fit.circle_setup import (
     parameters_in,
     path_setpoints,
     path_settling_us,
+    path_steps,
     require_circle,
 )
 from busplan.questions.fit.figures import CycleFigures, cycle_figures
@@ -33,7 +35,7 @@ from busplan.servo.axis import compiled_kernel
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath, circle_path
-from busplan.servo.runnable import MAX_SETPOINTS
+from busplan.servo.runnable import MAX_SETPOINTS, MAX_STEPS
 
 
 class Setup(NamedTuple):
@@ -204,6 +206,7 @@ def run_circles(
     for variant in variants:
         require_circle(variant)
     fits = [cycle_figures(variant, model=variant.bus.deciding_model) for variant in variants]
+    _require_few([variant for variant, fit in zip(variants, fits, strict=True) if fit.fits])
     setups = [setup_of(variant) if fit.fits else None for variant, fit in zip(variants, fits, strict=True)]
     simulated = [setup for setup in setups if setup]
     to_rank = [sources(setup) if with_contributions and setup else {} for setup in setups]
@@ -217,6 +220,17 @@ def run_circles(
     return CircleTestAnswer(
         network.profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions
     )
+
+
+def _require_few(networks: Sequence[Network]) -> None:
+    """Refuse circles that are held in memory together, and are longer than one may be."""
+    for what, count, most in (("set-points", path_setpoints, MAX_SETPOINTS), ("steps", path_steps, MAX_STEPS)):
+        together = sum(map(count, networks))
+        if together > most:
+            raise BusplanError(
+                f"the circles of {len(networks):,} periods take {together:,} {what} together, more than {most:,}; give "
+                "fewer periods"
+            )
 
 
 class _Counter:

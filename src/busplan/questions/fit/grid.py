@@ -20,7 +20,7 @@ from busplan.questions.fit.figures import (
 from busplan.questions.fit.most_nodes import most_and_safe_nodes
 from busplan.questions.fit.network import changed, model_names, trial
 from busplan.sections.machine import ProfileGroup
-from busplan.sections.profile import varied_nodes
+from busplan.sections.profile import Profile, varied_nodes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,9 +37,14 @@ MOST_TABLES: Final = 50_000
 """Most groups and messages of all settings of a picture together."""
 
 
+def tables_in(profile: Profile) -> int:
+    """Number of groups and messages of a profile."""
+    return len(profile.node_groups) + len(getattr(profile, "message", ()))
+
+
 def require_few_tables(network: Network, *, settings: int, most: int = MOST_TABLES) -> None:
     """Refuse a grid whose settings all together have too many groups and messages."""
-    tables = len(network.profile.node_groups) + len(getattr(network.profile, "message", ()))
+    tables = tables_in(network.profile)
     if settings * tables > most:
         raise BusplanError(
             f"{settings:,} settings of {tables:,} groups and messages take too long: give values for up to "
@@ -81,17 +86,22 @@ class Grid(NamedTuple):
         """Chunks of the grid in row-major order, of at most `most` points."""
         import numpy as np
 
-        # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
-        cut = next(number for number in range(len(self.shape) + 1) if prod(self.shape[number + 1 :]) <= most)
-        width = max(1, most // prod(self.shape[cut + 1 :]))
-        parts = [
-            *([slice(index, index + 1) for index in range(size)] for size in self.shape[:cut]),
-            *([slice(begin, begin + width) for begin in range(0, size, width)] for size in self.shape[cut : cut + 1]),
-            *([slice(size)] for size in self.shape[cut + 1 :]),
-        ]
-        for part in product(*parts):
-            values = [axis[places] for axis, places in zip(self.axes.values(), part, strict=True)]
+        for places in cuts(self.shape, most):
+            values = [axis[place] for axis, place in zip(self.axes.values(), places, strict=True)]
             yield Chunk(tuple(map(len, values)), dict(zip(self.axes, np.ix_(*values), strict=True)))
+
+
+def cuts(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
+    """Slices that cut an array of a shape into parts of at most `most` elements, in row-major order."""
+    # The axis to cut: a part has all values of the axes after it and one value of each axis before it.
+    cut = next(number for number in range(len(shape) + 1) if prod(shape[number + 1 :]) <= most)
+    width = max(1, most // prod(shape[cut + 1 :]))
+    places = [
+        *([slice(index, index + 1) for index in range(size)] for size in shape[:cut]),
+        *([slice(begin, min(begin + width, size)) for begin in range(0, size, width)] for size in shape[cut : cut + 1]),
+        *([slice(0, size)] for size in shape[cut + 1 :]),
+    ]
+    return product(*places)
 
 
 class GridPoint(NamedTuple):
@@ -191,12 +201,15 @@ def _counts(points: Sequence[GridPoint], group: ProfileGroup, *, model: str) -> 
 
 
 def _in_arrays(points: Sequence[GridPoint], *, without: str = "") -> Iterator[tuple[list[int], Network]]:
-    """Networks that stand for several points, in arrays where a kind has them: the places of the points, and each."""
+    """Networks that stand for several points: the places of the points, and each.
+
+    They hold arrays, but where nodes are counted, whose key is `without`, only of a kind that counts them in arrays.
+    """
     alike: dict[object, list[int]] = {}
     for place, point in enumerate(points):
         # What is no number is the same at all points of an array.
         words = tuple((key, None if _is_number(value) else value) for key, value in point.without(without))
-        alike.setdefault(words if has_arrays(point.network) else place, []).append(place)
+        alike.setdefault(words if not without or has_arrays(point.network) else place, []).append(place)
     for places in alike.values():
         first = points[places[0]]
         if len(places) == 1:

@@ -12,7 +12,7 @@ from busplan.buses.figure import TIMING_MODEL, unit_of
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
-from busplan.forms.blocks import Code, Report, Sentence
+from busplan.forms.blocks import Report, Sentence
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
@@ -27,9 +27,9 @@ from busplan.questions.base.arguments import (
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.fit.grid import Array
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor
-from busplan.questions.sweep.digest import first_rows, sentences
+from busplan.questions.sweep.digest import Digest
 from busplan.questions.sweep.rows import arrow_table, written_rows
-from busplan.questions.sweep.table import Columns, Sweep, checked_sweep, column_figures, figure_table
+from busplan.questions.sweep.table import Part, Sweep, checked_sweep, column_figures, parts_of
 from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
 
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import xarray as xr
 
-__all__ = ["SweepAnswer", "axis_values", "checked_sweep", "computed", "sweep"]
+__all__ = ["SHOWN", "Digest", "SweepAnswer", "axis_values", "checked_sweep", "computed", "sweep", "written_rows"]
 
-_SHOWN: Final = 20
+SHOWN: Final = 20
 """Rows of the report."""
 
 
@@ -55,12 +55,12 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     ----------
     sweep
         Its grid, timing models and options.
-    table
-        Its columns.
+    parts
+        Its table, part by part.
     """
 
     sweep: Sweep
-    table: Columns
+    parts: tuple[Part, ...]
 
     @property
     def profile(self) -> Profile:
@@ -70,24 +70,24 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
-        return tuple(self.table)
+        return self.sweep.columns
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self.table:
-            raise KeyError(f"no column {name!r}; there are {', '.join(self.table)}")
-        column = self.table[name]
+        if name not in self.columns:
+            raise KeyError(f"no column {name!r}; there are {', '.join(self.columns)}")
+        column = np.concatenate([part.column(name) for part in self.parts])
         words = set(column.tolist()) if column.dtype == object else set()
         figure = column_figures(self.sweep).get(name)
         if (figure and "word" not in figure.sort) or all(isinstance(word, bool) for word in words):
-            return column.copy()
+            return column
         texts = {word: str(spelled(word)) for word in words}
         return np.array([texts[word] for word in column.tolist()])
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.table)
+        return iter(self.columns)
 
     def __len__(self) -> int:
-        return len(self.table)
+        return len(self.columns)
 
     # A mapping would compare its columns: arrays, which have no single truth.
     __eq__, __hash__ = object.__eq__, object.__hash__
@@ -154,7 +154,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             pyarrow is not installed.
         """
         require_pyarrow("to_arrow()")
-        return arrow_table(self.sweep, self.table)
+        return arrow_table(self.sweep, self.parts)
 
     def to_polars(self) -> "pl.DataFrame":
         """Make a data frame of polars from `to_arrow`; words are categories.
@@ -176,7 +176,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
 
     def rows_in(self, form: RowsForm) -> Iterator[bytes]:
         """Write every row, piece by piece; "parquet" needs the extra `table`."""
-        return written_rows(form, self.sweep, self.table)
+        return written_rows(form, self.sweep, self.parts)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         rows = {ending: partial(self._bytes_in, form) for ending, form in ROWS_ENDINGS.items()}
@@ -187,12 +187,14 @@ class SweepAnswer(Answer, Mapping[str, Array]):
 
     def sentences(self) -> tuple[Sentence, ...]:
         """Sentences on the number of points, on those that fit, and on what is wrong at others."""
-        return tuple(sentences(self.sweep, self.table))
+        return tuple(self._digest(most=0).sentences())
 
-    def report(self, *, most: int | None = _SHOWN) -> Report:
+    def report(self, *, most: int | None = SHOWN) -> Report:
         """The answer in blocks, with its first rows; None for every row."""
-        rows = first_rows(self.sweep, self.table, most=most)
-        return Report(Sentence(("Sweep of ", Code(self.profile.name))), (*self.sentences(), *rows), {})
+        return self._digest(most=self.sweep.rows if most is None else most).report()
+
+    def _digest(self, *, most: int) -> Digest:
+        return Digest(self.sweep, most=most).take(self.parts)
 
 
 @with_its_constants
@@ -221,13 +223,13 @@ def sweep(
     circle
         Also run the circle test of every point, and add its columns (errors in mm, margins).
     unlimited
-        Allow more than 1,000 circle tests.
+        Allow up to 100,000 circle tests, not 1,000.
     executor
         With `circle`: where the tests run, in chunks of about a second; by default in this thread. Any
         `concurrent.futures.Executor` gives the same answer, and is not shut down. Worker processes must have this
         version of busplan.
     progress
-        Called now and then with the points, or the circle tests, that are done, and all of them [1].
+        Called now and then with the part that is done, and the whole.
 
     Returns
     -------
@@ -269,23 +271,30 @@ def sweep(
         unlimited=unlimited,
         changes=key_changes({f"constants.{name}": value for name, value in network.profile.constants}),
     )
-    return computed(checked, executor=executor, progress=progress)
+    return SweepAnswer(checked, tuple(computed(checked, executor=executor, progress=progress)))
 
 
-def computed(sweep: Sweep, *, executor: Executor | None = None, progress: Progress = ignored) -> SweepAnswer:
-    """The answer of a sweep.
+def computed(sweep: Sweep, *, executor: Executor | None = None, progress: Progress = ignored) -> Iterator[Part]:
+    """The table of a sweep, part by part; circle tests are run at once.
 
     BusplanError: the circle test of a point cannot be run. Errors that `executor` raises pass through.
     """
     require_executor(executor, circle=sweep.circle)
-    table = figure_table(sweep, progress=ignored if sweep.circle else progress)
-    if sweep.circle:
-        results = circle_results(sweep.profile, sweep.grid, executor=executor, progress=progress)
-        of_points = {name: _typed(name, values) for name, values in zip(CIRCLE_COLUMNS, results, strict=True)}
-        # One test a point, the same beside every timing model.
-        models = len(sweep.timing_models)
-        table |= {name: np.repeat(values, models) for name, values in of_points.items()}
-    return SweepAnswer(sweep, table)
+    if not sweep.circle:
+        return parts_of(sweep, progress=progress)
+    return _with_circles(sweep, circle_results(sweep.profile, sweep.grid, executor=executor, progress=progress))
+
+
+def _with_circles(sweep: Sweep, results: Array) -> Iterator[Part]:
+    """Parts with the columns of circle tests: one test a point, the same under every timing model."""
+    done = 0
+    for part in parts_of(sweep):
+        here = results[:, done : done + part.points]
+        done += part.points
+        circles = {
+            name: _typed(name, values).reshape(part.shape) for name, values in zip(CIRCLE_COLUMNS, here, strict=True)
+        }
+        yield part._replace(by_model=tuple({**columns, **circles} for columns in part.by_model))
 
 
 def _typed(name: str, values: Array) -> Array:

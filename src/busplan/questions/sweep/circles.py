@@ -8,7 +8,7 @@ import numpy as np
 
 from busplan.errors import BusplanError
 from busplan.profile.document import override
-from busplan.progress import Progress
+from busplan.progress import Progress, part_of
 from busplan.questions.circle import CircleFigures
 from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup_of
 from busplan.questions.fit.circle_setup import refusals
@@ -32,6 +32,8 @@ CIRCLE_COLUMNS: Final = (
 """Columns of circle tests, named as in `circle-test`."""
 MOST_CIRCLES_UNASKED: Final = 1000
 """Most circle tests without unlimited=True: minutes compiled, an hour in plain Python."""
+MOST_CIRCLES: Final = 100_000
+"""Most circle tests of a sweep: an hour of several processors. Each has its values in memory."""
 _ESTIMATED: Final = 100
 """Most points whose cost is estimated: that of others is like it."""
 _CHUNK_S: Final = 1.5
@@ -107,7 +109,8 @@ def circle_results(profile: Profile, grid: Grid, *, executor: Executor | None, p
     Truth values are 0 and 1, what is missing is NaN. BusplanError: the first point whose circle test cannot be run,
     before any is run.
     """
-    for point in grid.each_point():
+    checking, testing = (part_of(progress, number=number, of=2) for number in range(2))
+    for number, point in enumerate(grid.each_point(), start=1):
         causes = refusals(network_of(override(profile, point)))
         if causes:
             places = [[f"{key} = {value}" for key, value in point.items() if key != cause.name] for cause in causes]
@@ -117,14 +120,17 @@ def circle_results(profile: Profile, grid: Grid, *, executor: Executor | None, p
                     for place, cause in zip(places, causes, strict=True)
                 )
             )
-    results = run_points(profile, [*grid.each_point()], executor=executor, progress=progress)
-    return np.array([[getattr(result, name) for name in CIRCLE_COLUMNS] for result in results], dtype=float).T
+        checking(number, grid.points)
+    figures = np.empty((len(CIRCLE_COLUMNS), grid.points))
+    results = run_points(profile, [*grid.each_point()], executor=executor, progress=testing)
+    for place, result in enumerate(results):
+        figures[:, place] = [getattr(result, name) for name in CIRCLE_COLUMNS]
+    return figures
 
 
-def require_few(grid: Grid) -> None:
-    """Refuse more circle tests than anyone runs by mistake."""
-    if grid.points > MOST_CIRCLES_UNASKED:
-        raise BusplanError(
-            f"circle=True: {grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
-            "without unlimited=True; vary less, or give it"
-        )
+def require_few(grid: Grid, *, unlimited: bool) -> None:
+    """Refuse more circle tests than anyone runs by mistake, and more than a sweep takes."""
+    most = MOST_CIRCLES if unlimited else MOST_CIRCLES_UNASKED
+    if grid.points > most:
+        words = "a sweep takes; vary less" if unlimited else "are run without unlimited=True; vary less, or give it"
+        raise BusplanError(f"circle=True: {grid.points:,} points are more circle tests than the {most:,} that {words}")

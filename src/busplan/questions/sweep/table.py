@@ -1,12 +1,14 @@
-"""A sweep, checked, and its table: the figures of `capacity` for many profiles at once.
+"""A sweep, checked, and its table part by part: the figures of `capacity` for many profiles at once.
 
 The functions of `capacity` accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie
-along an axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are
-added here.
+along an axis of their own, so that a figure is computed, and written, only over the keys that it depends on. Figures in
+words are added here.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import gc
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial, reduce
+from itertools import chain
 from math import prod
 from typing import Final, NamedTuple
 
@@ -23,7 +25,7 @@ from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import VERDICTS, verdict_code
 from busplan.questions.fit.figures import COUNTS, TYPES, fit_numbers
-from busplan.questions.fit.grid import Array, Grid
+from busplan.questions.fit.grid import Array, Grid, cuts, require_few_tables, tables_in
 from busplan.questions.fit.most_nodes import MostNodes, most_and_safe_nodes
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
@@ -31,19 +33,62 @@ from busplan.questions.sweep.values import axis_values, checked_grid, grid_model
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile, varied_nodes
 
-CHUNK_POINTS: Final = 1 << 14
-"""Points computed at once: their arrays fit into the processor's cache."""
-
+_PART_POINTS: Final = 1 << 14
+"""Most points computed at once: their arrays fit into the processor's cache."""
+_PART_CELLS: Final = 8_000_000
+"""Most cells computed at once, of eight bytes each."""
+_TABLE_CELLS: Final = 20
+"""Numbers of each group or message at a point while its figures are computed, about."""
 MOST_CELLS: Final = 200_000_000
-"""Most cells of the table, of eight bytes each: a million points of one kind of nodes, fewer of many groups."""
+"""Most cells of the table: a million points of one kind of nodes, fewer of many groups. As text it has gigabytes."""
+_MOST_TABLES: Final = 20_000_000
+"""Most groups and messages of all points together: minutes of work."""
 MOST_GROUPS: Final = 128
 """Most groups, enough for each node of CANopen: the most nodes of each are searched, and each search counts all."""
 
 Columns = dict[str, Array]
-"""Columns by name, a row for each point and timing model, each of shape (rows,).
+"""Columns by name.
 
 Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
 """
+
+
+class Part(NamedTuple):
+    """The table of a contiguous part of the grid."""
+
+    shape: tuple[int, ...]
+    """Points along each axis of the grid."""
+    by_model: tuple[Columns, ...]
+    """Columns under each timing model, which broadcast to the shape."""
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return prod(self.shape)
+
+    def cut(self, most: int) -> "Iterator[Part]":
+        """Smaller parts, of at most `most` points, or of one."""
+        for places in cuts(self.shape, max(1, most)):
+
+            def at(values: Array, places: Sequence[slice] = places) -> Array:
+                # What does not depend on a key has one value along its axis.
+                return values[
+                    tuple(place if size > 1 else slice(1) for place, size in zip(places, values.shape, strict=True))
+                ]
+
+            shape = tuple(place.stop - place.start for place in places)
+            yield Part(
+                shape, tuple({name: at(column) for name, column in columns.items()} for columns in self.by_model)
+            )
+
+    def count(self, flags: Array) -> int:
+        """Number of points with a flag."""
+        return int(np.count_nonzero(np.broadcast_to(flags, self.shape)))
+
+    def column(self, name: str, write: Callable[[Array], Array] = np.asarray) -> Array:
+        """A column, a row for each point and timing model, of shape (rows,); `write` changes its different values."""
+        by_model = [np.broadcast_to(write(columns[name]), self.shape).ravel() for columns in self.by_model]
+        return np.stack(by_model, axis=1).ravel()
 
 
 class Sweep(NamedTuple):
@@ -75,6 +120,16 @@ class Sweep(NamedTuple):
             *(CIRCLE_COLUMNS if self.circle else ()),
         )
 
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.grid.points * len(self.timing_models)
+
+    @property
+    def point_cells(self) -> int:
+        """Cells of a point."""
+        return len(self.columns) * len(self.timing_models)
+
 
 def checked_sweep(
     network: Network,
@@ -94,10 +149,11 @@ def checked_sweep(
     grid = checked_grid(profile, axes, with_circle=circle)
     models = grid_models(network, grid, timing_models)
     varied = varied_nodes(profile).name if profile.group else ""
-    if circle and not unlimited:
-        require_few(grid)
+    if circle:
+        require_few(grid, unlimited=unlimited)
     sweep = Sweep(profile, bus.figures, bus.safety, bus.deciding_model, grid, models, varied, circle, changes)
     _require_few_cells(sweep)
+    require_few_tables(network, settings=grid.points, most=_MOST_TABLES)
     return sweep
 
 
@@ -108,7 +164,7 @@ def _require_few_cells(sweep: Sweep) -> None:
         raise BusplanError(
             f"{sweep.profile.name}: {groups:,} groups are more than the {MOST_GROUPS:,} a sweep takes; join like groups"
         )
-    most = MOST_CELLS // (columns * len(sweep.timing_models))
+    most = MOST_CELLS // sweep.point_cells
     if sweep.grid.points > most:
         raise ArgumentError(
             f"vary: {sweep.grid.points:,} points of {columns:,} columns are too many for a sweep; vary "
@@ -133,53 +189,61 @@ def column_figures(sweep: Sweep) -> dict[str, Figure]:
     return {**figures, **groups}
 
 
-def figure_table(sweep: Sweep, *, progress: Progress = ignored) -> Columns:
-    """All figures of `capacity` over the grid of a sweep.
+def parts_of(sweep: Sweep, *, progress: Progress = ignored) -> Iterator[Part]:
+    """All figures of `capacity` over the grid of a sweep, part by part in its order.
 
     References
     ----------
     Paper, equations (1)-(11).
     """
     grid, profile = sweep.grid, sweep.profile
-    names = (*grid.axes, *figure_names(profile, sweep.bus_figures))
-    parts: list[Columns] = []
     done = 0
-    for chunk in grid.chunks(CHUNK_POINTS):
-        by_model = [
-            {**chunk.values, **_figures(profile, chunk.values, model, group=sweep.group)}
-            for model in sweep.timing_models
-        ]
-        parts.append({name: _interleaved([columns[name] for columns in by_model], chunk.shape) for name in names})
-        done += prod(chunk.shape)
+    point_cells = max(sweep.point_cells, _TABLE_CELLS * tables_in(profile))
+    for chunk in grid.chunks(max(1, min(_PART_POINTS, _PART_CELLS // point_cells))):
+        by_model = (_figures(profile, chunk.values, model, group=sweep.group) for model in sweep.timing_models)
+        part = Part(chunk.shape, tuple({**chunk.values, **figures} for figures in by_model))
+        yield part
+        done += part.points
         progress(done, grid.points)
-    # A part lets go of a column when it is in the table.
-    return {name: np.concatenate([part.pop(name) for part in parts]) for name in names}
-
-
-def _interleaved(by_model: Sequence[Array], shape: tuple[int, ...]) -> Array:
-    """Arrays that broadcast to a shape, one for each timing model: point by point, and for each model by model."""
-    return np.stack([np.broadcast_to(column, shape).ravel() for column in by_model], axis=1).ravel()
+        # The events of a cycle refer to it, and Python counts objects, not the size of the arrays that they hold.
+        gc.collect()
 
 
 def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group: str) -> dict[str, Array]:
     """All figures of a chunk under one timing model; they broadcast to its shape."""
     for place, (key, axis) in enumerate(values.items()):
         if axis.dtype == object and axis.size > 1:
-            # Words among numbers: compute each value by itself and join the results along the axis.
+            # Words among numbers: compute each word by itself, and join the results along the axis.
+            alike = _numbers_and_words(axis.ravel().tolist())
             parts = [
-                _figures(profile, {**values, key: np.take(axis, [index], axis=place)}, model, group=group)
-                for index in range(axis.size)
+                _figures(profile, {**values, key: _taken(axis, indices, place)}, model, group=group)
+                for indices in alike
             ]
-            return {name: _joined([part[name] for part in parts], axis=place) for name in parts[0]}
+            return {name: _joined([part[name] for part in parts], alike, axis=place) for name in parts[0]}
     at_points = {key: axis.item() if axis.size == 1 else axis.astype(float) for key, axis in values.items()}
     figures = _columns(network_of(with_all_unchecked(profile, at_points)), model, group=group)
     one = (1,) * len(values)
     return {name: column.reshape(one) if column.size == 1 else column for name, column in figures.items()}
 
 
-def _joined(parts: list[Array], *, axis: int) -> Array:
-    shape = np.broadcast_shapes(*(part.shape for part in parts))
-    return np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=axis)
+def _numbers_and_words(values: Sequence[object]) -> list[list[int]]:
+    """Places of the numbers, together, and of each word."""
+    is_word = [isinstance(value, str | bool) for value in values]
+    numbers = [place for place, word in enumerate(is_word) if not word]
+    return [*([numbers] if numbers else []), *([place] for place, word in enumerate(is_word) if word)]
+
+
+def _taken(axis: Array, indices: list[int], place: int) -> Array:
+    taken: Array = np.take(axis, indices, axis=place)
+    return taken.astype(float) if len(indices) > 1 else taken
+
+
+def _joined(parts: Sequence[Array], places: Sequence[list[int]], *, axis: int) -> Array:
+    """One array of parts, each with its places along an axis."""
+    rest = np.broadcast_shapes(*(part.take([0], axis).shape for part in parts))
+    shapes = ((*rest[:axis], len(own), *rest[axis + 1 :]) for own in places)
+    joined = np.concatenate([np.broadcast_to(part, shape) for part, shape in zip(parts, shapes, strict=True)], axis)
+    return joined.take(np.argsort([*chain(*places)]), axis)
 
 
 def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:

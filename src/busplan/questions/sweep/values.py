@@ -25,7 +25,7 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
 MOST_POINTS: Final = 1_000_000
-"""Most points of a sweep, fewer with many columns: the work on them takes up to two gigabytes of memory."""
+"""Most points of a sweep, fewer with many columns: a minute of work, and a gigabyte of text."""
 
 
 def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bool) -> Grid:
