@@ -2,6 +2,7 @@
 
 import tomllib
 from dataclasses import replace
+from math import hypot
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -19,6 +20,7 @@ from tests.oracles.ethercat_recording import (
     pcapng,
     planned,
     simulated,
+    start_up,
     starts_and_hosts,
     statistics,
 )
@@ -290,6 +292,43 @@ def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
     assert codes == {}
     assert any("2 frames of process data at its ends are left out" in remark for remark in answer.remarks)
     assert next(figure.events for figure in answer.figures if figure.quantity == "period") == 400
+
+
+def test_each_group_has_the_mean_of_its_devices_by_port_times(tmp_path: Path) -> None:
+    plan = plan_of((1, 8, 1), (2, 8, 1), (1, 8, 1), (1, 8, 1)).replace('name = "g2"', 'name = "g2"\ncable_length_m = 200')
+    plan = "".join(plan.rsplit("delay_us = 0.698\n", 1))
+    # Two starts of the machine: means of 0.6, 1.0, 0.8 and 0.5 us. A start before them had fewer devices.
+    starts = (
+        start_up(hops_ns, clocks_ns=tuple(range(5, 6 + len(hops_ns))))
+        for hops_ns in ((300, 300), (500, 900, 800, 400), (700, 1100, 800, 600))
+    )
+    started = [(time - 1000 * (2 - place), frame) for place, start in enumerate(starts) for time, frame in start]
+    # Only the delays of the two devices of g1 are changed; g2 has a cable of 1 us one way.
+    line_us = 2 * (0.698 + 0.6 + 1.0 + 0.698 + 1.0 + 0.5)
+    machine = replace(
+        SHORT_LINE, jitter_us=0.5, host_us=20.0, host_spread_us=0.0, devices=5, line_us=line_us, schedule=(cycle(80),)
+    )
+    answer, _ = judged(started + simulated(machine, 50), tmp_path, plan=plan)
+    step_us = 0.010 / 12**0.5
+    shown = [figure for figure in answer.figures if "delay of device" in figure.quantity]
+    assert [(figure.quantity, figure.verdict, figure.events) for figure in shown] == [
+        ("delay of device 2", None, 2),
+        ("delay of device 3", None, 2),
+        ("mean delay of devices 2 to 3", "outside", 2),
+        ("delay of device 4", "within", 2),
+        ("delay of device 5", "within", 2),
+    ]
+    assert [figure.recorded for figure in shown] == pytest.approx([0.6, 1.0, 0.8, 0.8, 0.5])
+    # Device 5 is planned with the mean of 14 of 100BASE-TX, 0.6981 us, and errs as one of them, by 0.1233 us.
+    assert [figure.planned for figure in shown] == pytest.approx([0.698, 0.698, 0.698, 1.698, 0.6981], abs=0.0001)
+    assert [figure.uncertainty for figure in shown] == pytest.approx(
+        [2 * step_us * root for root in (2**0.5, 2**0.5, 1, 2**0.5)] + [2 * hypot(0.1233, step_us)], abs=0.0001
+    )
+    # What is shorter than its planned cable changes nothing.
+    assert {key: value for key, value in answer.edits.items() if key.endswith("delay_us")} == pytest.approx(
+        {"group.g1.delay_us": 0.8, "group.g3.delay_us": 0.5}
+    )
+    assert answer.edits["bus.master_us"] == pytest.approx(20, abs=0.02)
 
 
 @settings(max_examples=at_least(10, 80))
