@@ -250,9 +250,7 @@ def test_a_limit_holds_up_to_its_bound(
 ) -> None:
     within, beyond = (network_of(busplan.load_profile(name, changes=changes)) for changes in (kept, kept | broken))
     bus = within.bus
-    before, after = (
-        {limit.key for limit in bus.limits if limit.verdict_code(network)} for network in (within, beyond)
-    )
+    before, after = ({limit.key for limit in bus.limits if limit.verdict_code(network)} for network in (within, beyond))
     # Data of 511 devices never go in four telegrams of SERCOS III.
     assert before == ({"telegrams"} if "512 devices" in words else set())
     assert after - before == {key}

@@ -295,8 +295,8 @@ def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
 
 
 def test_each_group_has_the_mean_of_its_devices_by_port_times(tmp_path: Path) -> None:
-    plan = plan_of((1, 8, 1), (2, 8, 1), (1, 8, 1), (1, 8, 1)).replace('name = "g2"', 'name = "g2"\ncable_length_m = 200')
-    plan = "".join(plan.rsplit("delay_us = 0.698\n", 1))
+    of_ports, _, _ = plan_of((1, 8, 1), (2, 8, 1), (1, 8, 1), (1, 8, 1)).rpartition("delay_us")
+    plan = of_ports.replace('name = "g2"', 'name = "g2"\ncable_length_m = 200')
     # Two starts of the machine: means of 0.6, 1.0, 0.8 and 0.5 us. A start before them had fewer devices.
     starts = (
         start_up(hops_ns, clocks_ns=tuple(range(5, 6 + len(hops_ns))))
