@@ -48,8 +48,8 @@ FOUND: list[tuple[str, dict[str, Any], list[str]]] = [
         {"bus.gap_count": 7, "cycle.period_us": 500},
         [
             (
-                "BP113 bus.gap_count: fits at 7, does not fit at 63 after a bus reset: corrected margin -19.9 +/- 6.3 us; "
-                "have the bus manager write the gap count after each reset"
+                "BP113 bus.gap_count: fits at 7, does not fit at 63 after a bus reset: "
+                "corrected margin -19.9 +/- 6.3 us; have the bus manager write the gap count after each reset"
             )
         ],
     ),
@@ -96,8 +96,8 @@ FOUND: list[tuple[str, dict[str, Any], list[str]]] = [
         {"bus.sync_shift": 0.1, "bus.master_jitter_us": 2000},
         [
             (
-                "BP132 bus.sync_shift: the last command comes at 2189.8 +/- 124.4 us, SYNC0 at 100.0 us: 3 cycles late; "
-                f"{SYNC0} cycle.period_us = 2580, bus.sync_shift = 0.9"
+                "BP132 bus.sync_shift: the last command comes at 2189.8 +/- 124.4 us, SYNC0 at 100.0 us: "
+                f"3 cycles late; {SYNC0} cycle.period_us = 2580, bus.sync_shift = 0.9"
             )
         ],
     ),
@@ -116,8 +116,9 @@ FOUND: list[tuple[str, dict[str, Any], list[str]]] = [
         {"bus.distributed_clocks": False},
         [
             (
-                "BP131 bus.distributed_clocks: without them each drive acts when its frame passes, one after the other; "
-                "set bus.distributed_clocks = true if the drives have them; cheapest cure: bus.distributed_clocks = true"
+                "BP131 bus.distributed_clocks: without them each drive acts when its frame passes, "
+                "one after the other; set bus.distributed_clocks = true if the drives have them; "
+                "cheapest cure: bus.distributed_clocks = true"
             )
         ],
     ),
