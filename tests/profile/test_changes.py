@@ -213,3 +213,10 @@ def test_a_long_value_is_shortened_in_messages() -> None:
 def test_no_change_gives_the_profile_itself() -> None:
     profile = shipped()
     assert KeyChanges().applied(profile) is profile
+
+
+def test_changes_stay_as_they_are_where_one_goes_into_another() -> None:
+    execution = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.0}
+    for _ in range(2):
+        one: Any = busplan.load_profile("paper-4ms", changes={"node.execution": execution, "node.execution.base_us": 9})
+        assert (one.node.execution.base_us, execution["base_us"]) == (9, 30)

@@ -102,6 +102,37 @@ def test_the_doubt_of_the_gap_term_is_as_large_at_a_larger_gap_count_as_at_a_sma
 
 
 @pytest.mark.parametrize(
+    ("read", "write", "halves", "phys"),
+    # A half is a packet with its acknowledge. A PHY delays a packet by its arbitration, its data and its acknowledge:
+    # a split transaction six times, a concatenated one without the second arbitration, a unified one three times.
+    [("split", "split", 4, 12), ("concatenated", "unified", 3, 8), ("split", "unified", 3, 9)],
+)
+def test_bias_and_doubts_of_a_cycle_by_hand(read: str, write: str, halves: int, phys: int) -> None:
+    answers = {"node.read_response": read, "node.write_response": write}
+    bench = busplan.load_profile("paper-1ms", changes={**answers, "bus.gap_count": 33, "cycle.retries": 2})
+    (figures,) = busplan.capacity(bench, timing_model="standard").results
+    # Two nodes two hops away, and the retries; 0.827 us a half, by Table I, and half of the gap term, 4 ticks a count.
+    halves = 2 * halves + 2
+    gap_term_us = 2 * (63 - 33) / 98.304
+    assert figures.bias_us == pytest.approx(halves * (0.827025 + gap_term_us), abs=1e-5)
+    doubts = {doubt.key: doubt.us for doubt in figures.doubts}
+    # Of eight payloads of Table I, 0.258 us; the synchronous packet has no acknowledge.
+    assert doubts["residual"] == pytest.approx(halves * 0.2580614, abs=1e-5)
+    assert doubts["gap_term"] == pytest.approx(halves * gap_term_us / sqrt(3))
+    assert doubts["bus.phy_delay_us"] == pytest.approx((2 * phys + 2 * 3 + 2) * 2 * 0.02 / sqrt(3))
+
+
+def test_equation_11_is_for_nodes_that_are_alike_and_read_and_written() -> None:
+    def nodes(name: str, **changes: int) -> Any:
+        keys = {f"payload.{key}": size for key, size in changes.items()}
+        return busplan.capacity(busplan.load_profile(name, changes=keys), timing_model="standard").results[0].own
+
+    assert nodes("paper-1ms").nodes_eq11 > 1
+    assert [nodes("paper-1ms", **{way: 0}).nodes_eq11 for way in ("read_bytes", "write_bytes")] == [None, None]
+    assert nodes("gantry-24").nodes_eq11 is None
+
+
+@pytest.mark.parametrize(
     ("name", "model"),
     [("paper-4ms", "paper"), ("paper-4ms", "standard"), ("gantry-24", "standard"), ("dvrk", "standard")],
 )
