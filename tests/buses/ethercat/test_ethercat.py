@@ -17,6 +17,8 @@ from pydantic import ValidationError
 import busplan
 from busplan.buses import kind_named
 from busplan.errors import BusplanError
+from busplan.questions.fit.certainty import deciding_cycle
+from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
 from tests.registers import at_least
 
@@ -128,6 +130,52 @@ def test_three_frames_in_a_cycle() -> None:
     events = busplan.timeline(plan).cycle_events
     assert [event.label for event in events if event.kind == "overhead"] == [f"headers of frame {n}" for n in (1, 2, 3)]
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
+
+
+def test_commands_arrive_with_the_frames_of_their_devices() -> None:
+    drives = {"nodes": 100, "read_bytes": 20, "write_bytes": 12, "cable_length_m": 2.0}
+    cameras = {"nodes": 2, "axes": 0, "read_bytes": 900, "write_bytes": 1}
+    plan = grouped({"name": "drives", **drives}, {"name": "cameras", **cameras}, master_jitter_us=3.0)
+    cycle = deciding_cycle(network_of(plan))
+    frames_us = [(52 + size) * BYTE_US for size in (74 * 20, 26 * 20 + 900, 900)]
+    for node, frames in ((1, 1), (74, 1), (75, 2), (100, 2), (101, 2), (102, 3)):
+        way_us = node * E_BUS_US / 2 + min(node, 100) * 0.01
+        assert cycle.arrival_us(node) == pytest.approx(20 + 3 + sum(frames_us[:frames]) + way_us)
+
+
+def test_the_last_byte_passes_each_cable_and_device_there_and_back() -> None:
+    plan = grouped(
+        {"name": "drives", "nodes": 2, "read_bytes": 8, "write_bytes": 8, "cable_length_m": 10.0, "delay_us": 0.7},
+        {"name": "io", "nodes": 1, "axes": 0, "read_bytes": 1, "write_bytes": 1, "cable_length_m": 30.0},
+    )
+    there = [event for event in busplan.timeline(plan).cycle_events if event.kind in ("cable", "device")]
+    assert [(event.label, event.node, event.duration_us) for event in there] == [
+        (f"{label} device {node}", node, pytest.approx(us))
+        for label, node, us in (
+            ("cable to", 1, 0.05),
+            ("way to", 1, 0.7),
+            ("cable to", 2, 0.05),
+            ("way to", 2, 0.7),
+            ("cable to", 3, 0.15),
+            ("way to", 3, E_BUS_US / 2),
+            ("way back from", 3, E_BUS_US / 2),
+            ("cable back from", 3, 0.15),
+            ("way back from", 2, 0.7),
+            ("cable back from", 2, 0.05),
+            ("way back from", 1, 0.7),
+            ("cable back from", 1, 0.05),
+        )
+    ]
+
+
+def test_one_more_device_may_open_a_short_frame_which_arrives_sooner() -> None:
+    # 14 devices of 100 bytes fill a frame of 1452 bytes, and the 15th has one of 152.
+    plan, sent_us = profile(payload__read_bytes=100, bus__nodes=15), 20 + (1452 + 152) * BYTE_US + 15 * E_BUS_US
+    # Vendors count the last frame twice: 8 devices have one of 852 bytes and fit, and 9 to 14 take longer than 15.
+    for model, received, most in (("last-byte", 0, 15), ("vendors", 152, 8)):
+        at = busplan.load_profile(plan, changes={"cycle.period_us": sent_us + received * BYTE_US + 1})
+        (result,) = busplan.capacity(at, timing_model=[model]).results
+        assert (result.fits, result.max_nodes) == (True, most)
 
 
 @settings(max_examples=at_least(6, 40))
