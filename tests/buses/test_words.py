@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import busplan
+from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import network_of
 
 WORDS = Path(__file__).with_name("words.txt")
 NETWORKS: list[tuple[str, dict[str, Any]]] = [
     ("paper-4ms", {}),
     ("paper-4ms", {"bus.speed": "S800", "bus.charge_hops": "own", "bus.cable_length_m": 10}),
-    ("paper-4ms", {"bus.max_hops": 3, "bus.gap_count": 5, "node.write_response": "unified"}),
+    ("paper-4ms", {"bus.max_hops": 3, "bus.gap_count": 5, "node.write_response": "unified", "host.transaction_us": 5}),
     ("paper-4ms", {"bus.cable_length_m": 10, "bus.gap_count": 5, "node.read_response": "concatenated"}),
     ("dvrk", {}),
     ("dvrk", {"cycle.schedule": "individual", "bus.charge_hops": "own"}),
@@ -58,6 +59,10 @@ def said(name: str, changes: dict[str, Any]) -> Iterator[str]:
     yield f"  execution in the cycle, in a latency: {is_counted}; evidence: {', '.join(bus.evidence_for(network))}"
     size, most = (bus.payloads(network).step_bytes, bus.payloads(network).most_bytes)
     yield f"  payloads in steps of {size} up to {most} bytes, {bus.payloads(network).carrier}"
+    cycle = deciding_cycle(network)
+    yield f"  rests on {'; '.join(part.words + (part.key and f' ({part.key})') for part in cycle.rests_on())}"
+    keys = sorted({event.rests_on for event in cycle.events() if event.rests_on and event.us})
+    yield f"  its time has {', '.join(keys) or 'no key of its own'}"
     for setting in bus.settings(network):
         values = "; ".join(", ".join(f"{key} = {value}" for key, value in one.items()) for one in setting.values)
         yield f"  {setting.label} ({setting.cost.name}): {values or 'nothing else'}"
