@@ -1,11 +1,14 @@
 """Each limit of a bus: the largest value that keeps it, the next one, and what is said of that."""
 
+from math import inf
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import busplan
 from busplan.buses import kind_named, kind_names
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT
 from busplan.questions.fit.network import network_of
 
 Changes = dict[str, Any]
@@ -269,3 +272,26 @@ def test_every_limit_is_here() -> None:
         keys = {limit.key for limit in kind_named(kind).limits}
         here = {key for name, key, *_ in KEPT_AND_BROKEN if kinds[name] == kind}
         assert here | (keys & ELSEWHERE.keys()) == keys or kind == "can"  # test_can*.py
+
+
+QUEUES = """schema_version = 1
+name = "queues"
+bus = {{kind = "can", bit_rate_kbit_s = 500, queue = "{}"}}
+"""
+MESSAGE = """[[message]]
+name = "m{}"
+identifier = {}
+sender = "host"
+payload_bytes = 8
+period_us = 500
+"""
+
+
+@pytest.mark.parametrize(("queue", "code"), [("priority", BROKEN), ("fifo", NOT_SHOWN_KEPT)])
+def test_what_is_only_perhaps_endless_is_not_broken(queue: str, code: int, tmp_path: Path) -> None:
+    # Two frames of 270 us in 500 us: of a queue of unknown order nobody knows which of them waits without end.
+    (tmp_path / "queues.toml").write_text(QUEUES.format(queue) + MESSAGE.format(1, 1) + MESSAGE.format(2, 2))
+    network = network_of(busplan.load_profile(tmp_path / "queues.toml"))
+    deadline = network.bus.limit("deadline")
+    assert deadline is not None
+    assert (deadline.value(network), deadline.verdict_code(network)) == (inf, code)

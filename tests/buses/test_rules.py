@@ -103,11 +103,11 @@ FOUND: list[tuple[str, dict[str, Any], list[str]]] = [
     ),
     (
         "ethercat-servo-8",
-        {"bus.master_jitter_us": 320},
+        {"bus.master_jitter_us": 250},
         [
             (
-                "BP132 bus.sync_shift: the last command comes at 509.8 +/- 124.4 us, SYNC0 at 500.0 us: "
-                f"maybe 1 cycle late; {SYNC0} bus.sync_shift = 0.7"
+                "BP132 bus.sync_shift: the last command comes at 439.8 +/- 124.4 us, SYNC0 at 500.0 us: "
+                f"maybe 1 cycle late; {SYNC0} bus.sync_shift = 0.6"
             )
         ],
     ),

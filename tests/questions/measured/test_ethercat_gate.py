@@ -463,8 +463,9 @@ def test_the_worst_start_is_within_its_u(tmp_path: Path) -> None:
 
 
 def test_stamps_of_no_port_say_no_time(tmp_path: Path) -> None:
-    packets = simulated(MACHINE, 1000)
-    back_at_once = [(time - 35 * bool(frame[6] & 2), frame) for time, frame in packets]
+    # Frames of 800 bytes and of 40, whose trips would show the time of a byte.
+    packets = simulated(replace(MACHINE, schedule=(cycle(800), cycle(40))), 1000)
+    back_at_once = [(time - 95 * bool(frame[6] & 2), frame) for time, frame in packets]
     coarse = [(time // 1000 * 1000, frame) for time, frame in packets]
     in_bursts = [(time // 20_000 * 20_000 + place % 40, frame) for place, (time, frame) in enumerate(packets)]
     at_one_time = [(0.0, frame) for _, frame in packets]
@@ -474,7 +475,7 @@ def test_stamps_of_no_port_say_no_time(tmp_path: Path) -> None:
         (in_bursts, "stamped in bursts"),
         (at_one_time, "stamped in bursts"),
     ):
-        answer, codes = judged(stamped, tmp_path)
+        answer, codes = judged(stamped, tmp_path, plan=plan_of((8, 5, 1), (2, 190, 2)))
         assert set(codes.values()) == {"BP403"}
         assert words in " ".join(answer.shows_nothing)
         assert answer.edits == {}
