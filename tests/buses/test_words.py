@@ -12,6 +12,7 @@ from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import network_of
 
 WORDS = Path(__file__).with_name("words.txt")
+SPLIT = {"group.partial.read_response": "split"}
 NETWORKS: list[tuple[str, dict[str, Any]]] = [
     ("paper-4ms", {}),
     ("paper-4ms", {"bus.speed": "S800", "bus.charge_hops": "own", "bus.cable_length_m": 10}),
@@ -19,7 +20,7 @@ NETWORKS: list[tuple[str, dict[str, Any]]] = [
     ("paper-4ms", {"bus.cable_length_m": 10, "bus.gap_count": 5, "node.read_response": "concatenated"}),
     ("dvrk", {}),
     ("dvrk", {"cycle.schedule": "individual", "bus.charge_hops": "own"}),
-    ("dvrk", {"cycle.schedule": "individual", "bus.root": "host", "bus.charge_hops": "own"}),
+    ("dvrk", {"cycle.schedule": "individual", "bus.root": "host", "bus.charge_hops": "own"} | SPLIT),
     ("ethercat-servo-8", {}),
     ("ethercat-servo-8", {"bus.master": "TwinCAT", "bus.nodes": 120, "bus.pipeline_cycles": 2, "bus.sync_shift": 0.85}),
     ("ethercat-servo-8", {"bus.process_data": "LRD-LWR", "bus.distributed_clocks": False}),

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 import busplan
 from busplan.buses import kind_named
+from busplan.buses.ethercat.cycle import EthercatCycle
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import network_of
@@ -122,6 +123,9 @@ def test_three_frames_in_a_cycle() -> None:
     # 74 drives fill the first frame with 1480 bytes, 26 go with a camera, and the other camera has no room beside it.
     packed = busplan.EthercatFigures.of(result)
     assert (packed.frames, packed.process_bytes) == (3, 100 * 20 + 2 * 900)
+    for one, size, padding in ((plan, 3800 + 3 * 12, 0), (profile(payload__read_bytes=1, bus__nodes=1), 24, 20)):
+        packing = EthercatCycle(network_of(one), "last-byte").packing
+        assert (packing.datagrams_bytes, packing.padding_bytes) == (size, padding)
     last = 52 + 900
     sent = (3 * 52 + 3800) * BYTE_US
     assert result.required_us == pytest.approx(20 + sent + 102 * E_BUS_US)

@@ -122,6 +122,24 @@ def test_bias_and_doubts_of_a_cycle_by_hand(read: str, write: str, halves: int, 
     assert doubts["bus.phy_delay_us"] == pytest.approx((2 * phys + 2 * 3 + 2) * 2 * 0.02 / sqrt(3))
 
 
+def test_the_longest_latency_is_that_of_the_farthest_node() -> None:
+    # Nodes that are charged their own hops: the fifth has as many as all have where the farthest counts.
+    changes = {"bus.nodes": 5, "node.read_response": "concatenated"}
+    farthest, own = (
+        busplan.capacity(
+            busplan.load_profile("paper-1ms", changes={**changes, "bus.charge_hops": hops}), timing_model="standard"
+        )
+        .results[0]
+        .own
+        for hops in ("farthest", "own")
+    )
+    for key in ("read_latency_us", "write_latency_us", "read_transaction_us", "write_latency_with_gaps_us"):
+        assert getattr(own, key) == pytest.approx(getattr(farthest, key))
+    # Data and acknowledges of one hop less on average for each of two hops: 1 to 5 are 3 hops.
+    hop_us = 0.023 + 14 / 98.304
+    assert farthest.reads_us - own.reads_us == pytest.approx(5 * 2 * 4 * hop_us)
+
+
 def test_equation_11_is_for_nodes_that_are_alike_and_read_and_written() -> None:
     def nodes(name: str, **changes: int) -> Any:
         keys = {f"payload.{key}": size for key, size in changes.items()}

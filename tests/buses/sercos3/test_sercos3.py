@@ -216,6 +216,22 @@ def test_a_loop_on_the_host_rests_on_the_feedback_of_the_cycle_before() -> None:
     assert delay_us("next_sync", bus__timing_method="at-last") == 1000
 
 
+@pytest.mark.parametrize(
+    ("changes", "due_us"),
+    # Feedback is due when the first AT begins: behind the MDT, the channel that is open, or the devices' least time.
+    [
+        ({}, 20.72 + 1.98),
+        ({"bus__at_start_us": 20.0}, 20.72 + 1.98),
+        ({"bus__at_start_us": 90.0}, 90.0),
+        ({"bus__timing_method": "mdt-ucc-at"}, 20.72 + 1.98),
+        ({"bus__timing_method": "mdt-ucc-at", "cycle__nonperiodic_us": 130.0}, 20.72 + 2 * 1.98 + 130 + 17.68),
+    ],
+)
+def test_feedback_is_due_when_the_first_at_begins(changes: dict[str, Any], due_us: float) -> None:
+    effect_us, due_us = 0.32 + 20.72 + 17.68 + 60, 0.32 + due_us
+    assert delay_us("on_arrival", **changes) == pytest.approx(1000 + effect_us - (due_us - 60))
+
+
 def test_the_order_of_the_cycle_is_that_of_the_method() -> None:
     def order(method: str) -> list[str]:
         events = busplan.timeline(profile(bus__timing_method=method), timing_model="window").cycle_events

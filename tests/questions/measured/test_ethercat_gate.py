@@ -285,9 +285,16 @@ def test_a_read_of_the_state_of_all_mailboxes_is_the_masters(
     plan = plan_of((nodes, 4, 1))
     if planned is not None:
         plan = plan.replace("master_us", f"housekeeping_bytes = {planned}\nmaster_us", 1)
-    frame = ((LRW, 0x10000, 8 * nodes), (LRD, 0x900_0000, size), (FRMW, 0, 8))
+    frame = ((LRW, 0x10000, 8 * nodes), (LRD, 0x900_0000, size), (FRMW, 0x910_1001, 8))
     answer, _ = judged(simulated(replace(MACHINE, devices=nodes, schedule=((frame,),)), 40), tmp_path, plan=plan)
     assert answer.edits.get("bus.housekeeping_bytes") == edit
+
+
+@pytest.mark.parametrize(("trip_us", "is_early"), [(12.5, False), (12.0, True)])
+def test_a_frame_is_back_no_sooner_than_it_is_sent(trip_us: float, is_early: bool, tmp_path: Path) -> None:
+    # 164 bytes without the gap of 12 are 13.12 us; of two stamps in steps of 0.5 us each may err by one.
+    answer, _ = judged(in_turn({30: trip_us, 32: 50.5}, {}), tmp_path)
+    assert any("1 frame returned sooner than it takes" in remark for remark in answer.remarks) is is_early
 
 
 @pytest.mark.parametrize("first", [0, 1])
