@@ -410,6 +410,16 @@ def test_a_loop_takes_whole_periods_with_distributed_clocks() -> None:
     assert free["feedback"] == pytest.approx(500 + own_us - 20 * BYTE_US + 3 * 0.1507)
 
 
+def test_the_slowest_group_decides_how_many_periods_a_loop_has() -> None:
+    # SYNC0 at 250 us: drives take a period; outputs that need 300 us, and are not read, miss one SYNC0.
+    drives = {"name": "drives", "nodes": 2, "read_bytes": 8, "write_bytes": 8}
+    outputs = {"name": "outputs", "nodes": 1, "axes": 0, "read_bytes": 0, "write_bytes": 4}
+    for base_us, periods in ((40.0, 1 + 0 + 1), (300.0, 1 + 1 + 1)):
+        slow = {**outputs, "execution": {"kind": "linear", "grade": "measured", "base_us": base_us, "per_byte_us": 0.0}}
+        cycle = deciding_cycle(network_of(grouped(drives, slow, distributed_clocks=True)))
+        assert (cycle.loop_periods(at_sync=True), cycle.loop_periods(at_sync=False)) == (periods, 2)
+
+
 def test_a_frame_takes_no_sample_that_it_triggers_itself() -> None:
     def feedback(execution_us: float) -> Any:
         result = busplan.latency(

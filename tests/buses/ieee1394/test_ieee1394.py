@@ -223,6 +223,17 @@ def test_a_cycle_start_goes_between_the_first_rounds_that_are_due_after_it(nodes
     assert starts == cycle.number_of_starts > 2
 
 
+def test_the_gap_count_table_is_met_by_both_methods() -> None:
+    (kind,) = busplan.evidence("ieee1394").kinds
+    rows = {
+        row.method: (row.published, row.computed)
+        for section in kind.sections
+        for row in section.comparisons
+        if row.method in ("table of busplan", "delays at the base rate")
+    }
+    assert rows == {"table of busplan": (23, 23), "delays at the base rate": (23, 23)}
+
+
 def test_the_constant_of_equation_15_is_a_sum_of_rounded_terms() -> None:
     (kind,) = busplan.evidence("ieee1394").kinds
     (constant,) = (

@@ -136,6 +136,72 @@ def test_phases_of_answers_that_need_no_arbitration_by_hand() -> None:
     assert {key: written[key] for key in expected} == pytest.approx(expected, rel=1e-14)
 
 
+SUB_US, RESET_US = (29 + 16 * 63) / 98.304, (53 + 32 * 63) / 98.304
+"""10.549 and 21.047 us."""
+
+
+@pytest.mark.parametrize(
+    ("model", "changes", "idle"),
+    [
+        # The paper's gaps run by the clock of S400, four times as fast.
+        ("paper", {}, [("subaction gap", SUB_US / 4), ("arbitration reset gap", RESET_US / 4)]),
+        (
+            "standard",
+            {"node__read_response": "concatenated"},
+            [("arbitration reset gap after the transaction", RESET_US)],
+        ),
+        # A node that is ready before the subaction gap waits for it; one that is later than the reset gap waits again.
+        (
+            "standard",
+            {"node__execution__base_us": 2.0},
+            [
+                ("rest of the subaction gap before the response", SUB_US - 2),
+                ("arbitration reset gap after the response", RESET_US),
+            ],
+        ),
+        (
+            "standard",
+            {"node__execution__base_us": 15.0},
+            [("arbitration reset gap after the response", RESET_US)],
+        ),
+        ("standard", {"node__execution__base_us": 40.0}, [("subaction gap after the response", SUB_US)]),
+        # A node that is alone with its host may have had its turn, and then waits for the reset gap.
+        (
+            "standard",
+            {"node__execution__base_us": 2.0, "bus__nodes": 1},
+            [
+                ("rest of the subaction gap before the response", SUB_US - 2),
+                ("arbitration reset gap after the response", RESET_US),
+                ("allowance for a faster node", RESET_US - SUB_US),
+            ],
+        ),
+        # At most 25 us: a node that is ready with the reset gap makes the next request wait for longer.
+        (
+            "standard",
+            {"node__execution__base_us": 15.0, "node__execution__worst_extra_us": 10.0},
+            [
+                ("subaction gap after the response", SUB_US),
+                ("allowance for a faster node", 2 * RESET_US - 25 - SUB_US),
+            ],
+        ),
+    ],
+)
+def test_idle_bus_of_a_transaction_by_hand(
+    model: str, changes: dict[str, object], idle: list[tuple[str, float]]
+) -> None:
+    keys = {key.replace("__", "."): value for key, value in changes.items()}
+    bench = busplan.load_profile("paper-two-node", changes={"node.execution": EXECUTION, "bus.nodes": 2, **keys})
+    gaps = ("subaction_gap", "arbitration_reset_gap", "allowance")
+    events = busplan.timeline(bench, timing_model=model).cycle_events
+    found = [
+        (one.label, one.duration_us)
+        for one in events
+        if one.kind in gaps and one.transaction == "read" and one.node == 1
+    ]
+    assert [label for label, _ in found] == [label for label, _ in idle]
+    assert [us for _, us in found] == pytest.approx([us for _, us in idle])
+
+
 def test_a_known_execution_is_found_in_its_latency_and_no_answer_but_a_split_one_shows_it() -> None:
     bench = busplan.load_profile("paper-two-node", changes={"node.execution": EXECUTION})
     latency_us = phases_of("write", "standard")["latency_us"] or 0.0

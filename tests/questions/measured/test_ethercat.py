@@ -358,6 +358,9 @@ def test_few_cycles_have_no_period(tmp_path: Path) -> None:
     answer = of_machine(Machine(), tmp_path, cycles=5)
     assert answer.shows_nothing == ("it has 5 cycles, but a period needs at least 10",)
     assert (figure(answer, "master's time").events, figure(answer, "master's time").verdict) == (5, "not shown")
+    reasons = {one.quantity: one.hidden for one in answer.figures if one.hidden}
+    few = "5 cycles, but a period needs at least 10"
+    assert {name: reasons[name] for name in ("period", "latest start")} == {"period": few, "latest start": few}
 
 
 # --- the command ----------------------------------------------------------------------------------------

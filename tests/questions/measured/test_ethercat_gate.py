@@ -195,13 +195,15 @@ def test_lost_frames_and_wrong_counters_count_against_the_same_limit(tmp_path: P
     assert judged(simulated(machine, 1000), tmp_path, plan=FOUR + "[limits]\nmissed_cycles = 2\n")[1] == {}
 
 
-def in_turn(trips_us: dict[int, float], late_us: dict[int, float], cycles: int = 201) -> Packets:
-    """A capture of `FOUR`: cycles of 104 and 84 bytes return after 50 and 46 us, but some, and start late in some."""
+def in_turn(
+    trips_us: dict[int, float], late_us: dict[int, float], *, usual_us: tuple[float, float] = (50.0, 46.0)
+) -> Packets:
+    """A capture of `FOUR`: cycles of 104 and 84 bytes return after the usual times, but some, and some start late."""
     packets = []
-    for number in range(cycles):
+    for number in range(201):
         (frame,) = MACHINE.schedule[number % 2]
         start_us = 1000.0 * number + late_us.get(number, 0.0)
-        back_us = start_us + trips_us.get(number, (50.0, 46.0)[number % 2])
+        back_us = start_us + trips_us.get(number, usual_us[number % 2])
         for time, counters, returned in ((start_us, (), False), (back_us, (30 - number % 2, 8), True)):
             packets.append((time, ethernet(frame, index=number % 256, counters=counters, returned=returned)))
     return packets
@@ -259,6 +261,15 @@ def test_every_figure_of_a_capture_by_hand(tmp_path: Path) -> None:
         "bus.master_jitter_us": pytest.approx(7.5, abs=0.0011),
         "bus.master_jitter_cycles": 201,
     }
+
+
+def test_a_master_that_takes_less_than_nothing_shows_other_devices(tmp_path: Path) -> None:
+    # 0.34 us sooner than wire, copy and devices take, in the cycles that take longest.
+    answer, _ = judged(in_turn({}, {}, usual_us=(25.2, 23.6)), tmp_path)
+    assert recorded(answer, "master's time") == pytest.approx(-0.3448, abs=1e-4)
+    words = "Round trips are shorter than with the profile's devices: the machine has fewer or faster ones."
+    assert words in answer.remarks
+    assert "bus.master_us" not in answer.edits
 
 
 @pytest.mark.parametrize(("cycles", "is_missing"), [(9, False), (10, True)])
