@@ -52,18 +52,18 @@ def said(name: str, changes: dict[str, Any]) -> Iterator[str]:
         yield f"  {setup}"
     if path := bus.path_words(network):
         yield f"  {path}"
-    yield from (f"  warning: {words}" for words in bus.warnings(network, nodes=[1, int(network.nodes), 20]))
+    yield from (f"  warning: {warning}" for warning in bus.warnings(network, nodes=[1, int(network.nodes), 20]))
     for model in bus.timing_models:
         if keys := bus.cannot_express(network, model=model.name):
             yield f"  {model.name} has no term for {', '.join(keys)}"
     is_counted = bus.has_execution(network), bus.has_execution(network, of_latency=True)
     yield f"  execution in the cycle, in a latency: {is_counted}; evidence: {', '.join(bus.evidence_for(network))}"
-    size, most = (bus.payloads(network).step_bytes, bus.payloads(network).most_bytes)
-    yield f"  payloads in steps of {size} up to {most} bytes, {bus.payloads(network).carrier}"
+    size, most, carrier = bus.payloads(network)
+    yield f"  payloads in steps of {size} up to {most} bytes, {carrier}"
     cycle = deciding_cycle(network)
     yield f"  rests on {'; '.join(part.words + (part.key and f' ({part.key})') for part in cycle.rests_on())}"
-    keys = sorted({event.rests_on for event in cycle.events() if event.rests_on and event.us})
-    yield f"  its time has {', '.join(keys) or 'no key of its own'}"
+    timed = sorted({event.rests_on for event in cycle.events() if event.rests_on and event.us})
+    yield f"  its time has {', '.join(timed) or 'no key of its own'}"
     for setting in bus.settings(network):
         values = "; ".join(", ".join(f"{key} = {value}" for key, value in one.items()) for one in setting.values)
         yield f"  {setting.label} ({setting.cost.name}): {values or 'nothing else'}"

@@ -1,5 +1,6 @@
 """The standard's figures against their public sources."""
 
+from functools import cache
 from math import ceil, fsum, sqrt
 from typing import Any
 
@@ -59,14 +60,15 @@ def test_what_no_opened_source_confirms_is_called_so() -> None:
     assert recalled == {1.63, 0.25, 4096, 8192, 16384}
 
 
-def test_published_machines_fit_their_periods() -> None:
+@cache
+def published() -> list[Any]:
+    """Every published figure beside the computed one."""
     (kind,) = busplan.evidence("ieee1394").kinds
-    comparisons = [
-        comparison
-        for section in kind.sections
-        for comparison in section.comparisons
-        if "axes of a" in comparison.section
-    ]
+    return [comparison for section in kind.sections for comparison in section.comparisons]
+
+
+def test_published_machines_fit_their_periods() -> None:
+    comparisons = [comparison for comparison in published() if "axes of a" in comparison.section]
     periods_us = [(comparison.quantity, comparison.published) for comparison in comparisons[::2]]
     assert periods_us == [("4 axes", 250), ("8 axes", 500)]
     assert all(0 < comparison.computed < (comparison.published or 0.0) for comparison in comparisons)
@@ -123,21 +125,18 @@ def test_bias_and_doubts_of_a_cycle_by_hand(read: str, write: str, halves: int, 
 
 
 def test_the_longest_latency_is_that_of_the_farthest_node() -> None:
-    # Nodes that are charged their own hops: the fifth has as many as all have where the farthest counts.
-    changes = {"bus.nodes": 5, "node.read_response": "concatenated"}
-    farthest, own = (
-        busplan.capacity(
-            busplan.load_profile("paper-1ms", changes={**changes, "bus.charge_hops": hops}), timing_model="standard"
+    def figures(charge_hops: str) -> Any:
+        changes = {"bus.nodes": 5, "node.read_response": "concatenated", "bus.charge_hops": charge_hops}
+        return (
+            busplan.capacity(busplan.load_profile("paper-1ms", changes=changes), timing_model="standard").results[0].own
         )
-        .results[0]
-        .own
-        for hops in ("farthest", "own")
-    )
+
+    # The fifth node has as many hops of its own as all are charged where the farthest counts.
+    farthest, own = figures("farthest"), figures("own")
     for key in ("read_latency_us", "write_latency_us", "read_transaction_us", "write_latency_with_gaps_us"):
         assert getattr(own, key) == pytest.approx(getattr(farthest, key))
-    # Data and acknowledges of one hop less on average for each of two hops: 1 to 5 are 3 hops.
-    hop_us = 0.023 + 14 / 98.304
-    assert farthest.reads_us - own.reads_us == pytest.approx(5 * 2 * 4 * hop_us)
+    # Two packets and two acknowledges of a read go over 3 hops on average, and not over 5.
+    assert farthest.reads_us - own.reads_us == pytest.approx(5 * 4 * 2 * (0.023 + 14 / 98.304))
 
 
 def test_equation_11_is_for_nodes_that_are_alike_and_read_and_written() -> None:
@@ -224,21 +223,13 @@ def test_a_cycle_start_goes_between_the_first_rounds_that_are_due_after_it(nodes
 
 
 def test_the_gap_count_table_is_met_by_both_methods() -> None:
-    (kind,) = busplan.evidence("ieee1394").kinds
-    rows = {
-        row.method: (row.published, row.computed)
-        for section in kind.sections
-        for row in section.comparisons
-        if row.method in ("table of busplan", "delays at the base rate")
-    }
-    assert rows == {"table of busplan": (23, 23), "delays at the base rate": (23, 23)}
+    methods = ("table of busplan", "delays at the base rate")
+    met = {row.method: (row.published, row.computed) for row in published() if row.method in methods}
+    assert met == dict.fromkeys(methods, (23, 23))
 
 
 def test_the_constant_of_equation_15_is_a_sum_of_rounded_terms() -> None:
-    (kind,) = busplan.evidence("ieee1394").kinds
-    (constant,) = (
-        row for section in kind.sections for row in section.comparisons if row.method == "terms rounded first"
-    )
+    (constant,) = (row for row in published() if row.method == "terms rounded first")
     assert constant.published == 3.11
     assert constant.computed == pytest.approx(3.11, abs=1e-9)
 

@@ -99,6 +99,13 @@ def judged(
     return busplan.measured(profile, capture), {text.partition(": ")[0]: code for text, code in words.items()}
 
 
+def compared(packets: Packets, folder: Path, plan: str = FOUR) -> busplan.MeasuredAnswer:
+    """The answer alone."""
+    (folder / "capture.pcapng").write_bytes(pcapng(packets))
+    (folder / "plan.toml").write_text(plan)
+    return busplan.measured(folder / "plan.toml", folder / "capture.pcapng")
+
+
 def recorded(answer: busplan.MeasuredAnswer, quantity: str) -> float | None:
     return next(figure.recorded for figure in answer.figures if figure.quantity == quantity)
 
@@ -210,7 +217,7 @@ def in_turn(
 
 
 def test_every_figure_of_a_capture_by_hand(tmp_path: Path) -> None:
-    answer, _ = judged(in_turn({30: 53.5, 71: 57.0}, {100: 7.5}), tmp_path)
+    answer = compared(in_turn({30: 53.5, 71: 57.0}, {100: 7.5}), tmp_path)
     # On the wire 40 bytes, 12 of the process data and 20 of the clocks; 8 devices of 0.698 us; 3.533 ns for a byte.
     way_us, copies_us = 16 * 0.698, (104 * 0.0035333, 84 * 0.0035333)
     wires_us = (72 + 104) * 0.08, (72 + 84) * 0.08
@@ -265,7 +272,7 @@ def test_every_figure_of_a_capture_by_hand(tmp_path: Path) -> None:
 
 def test_a_master_that_takes_less_than_nothing_shows_other_devices(tmp_path: Path) -> None:
     # 0.34 us sooner than wire, copy and devices take, in the cycles that take longest.
-    answer, _ = judged(in_turn({}, {}, usual_us=(25.2, 23.6)), tmp_path)
+    answer = compared(in_turn({}, {}, usual_us=(25.2, 23.6)), tmp_path)
     assert recorded(answer, "master's time") == pytest.approx(-0.3448, abs=1e-4)
     words = "Round trips are shorter than with the profile's devices: the machine has fewer or faster ones."
     assert words in answer.remarks
@@ -279,7 +286,7 @@ def test_ten_cycles_in_a_row_are_operation(cycles: int, is_missing: bool, tmp_pa
         [packet for packet in packets if packet[0] < 29_900 or packet[0] > (60 - cycles) * 1000 - 100],
         [packet for packet in packets if packet[0] < cycles * 1000 - 100 or packet[0] > 29_900],
     ):
-        answer, _ = judged(kept, tmp_path)
+        answer = compared(kept, tmp_path)
         assert recorded(answer, "cycles without a frame") == (30 - cycles if is_missing else 0)
         words = f"{cycles} frames of process data at its ends are left out"
         assert any(words in remark for remark in answer.remarks) is not is_missing
@@ -297,14 +304,14 @@ def test_a_read_of_the_state_of_all_mailboxes_is_the_masters(
     if planned is not None:
         plan = plan.replace("master_us", f"housekeeping_bytes = {planned}\nmaster_us", 1)
     frame = ((LRW, 0x10000, 8 * nodes), (LRD, 0x900_0000, size), (FRMW, 0x910_1001, 8))
-    answer, _ = judged(simulated(replace(MACHINE, devices=nodes, schedule=((frame,),)), 40), tmp_path, plan=plan)
+    answer = compared(simulated(replace(MACHINE, devices=nodes, schedule=((frame,),)), 40), tmp_path, plan=plan)
     assert answer.edits.get("bus.housekeeping_bytes") == edit
 
 
 @pytest.mark.parametrize(("trip_us", "is_early"), [(12.5, False), (12.0, True)])
 def test_a_frame_is_back_no_sooner_than_it_is_sent(trip_us: float, is_early: bool, tmp_path: Path) -> None:
     # 164 bytes without the gap of 12 are 13.12 us; of two stamps in steps of 0.5 us each may err by one.
-    answer, _ = judged(in_turn({30: trip_us, 32: 50.5}, {}), tmp_path)
+    answer = compared(in_turn({30: trip_us, 32: 50.5}, {}), tmp_path)
     assert any("1 frame returned sooner than it takes" in remark for remark in answer.remarks) is is_early
 
 
@@ -426,7 +433,7 @@ def test_each_group_has_the_mean_of_its_devices_by_port_times(tmp_path: Path) ->
     machine = replace(
         SHORT_LINE, jitter_us=0.5, host_us=20.0, host_spread_us=0.0, devices=5, line_us=line_us, schedule=(cycle(80),)
     )
-    answer, _ = judged(started + simulated(machine, 50), tmp_path, plan=plan)
+    answer = compared(started + simulated(machine, 50), tmp_path, plan=plan)
     step_us = 0.010 / 12**0.5
     shown = [figure for figure in answer.figures if "delay of device" in figure.quantity]
     assert [(figure.quantity, figure.verdict, figure.events) for figure in shown] == [
