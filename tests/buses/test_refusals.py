@@ -87,3 +87,18 @@ def test_what_no_bus_can_be_is_refused_in_words(name: str, changes: dict[str, An
 @pytest.mark.parametrize(("name", "changes"), TAKEN)
 def test_what_stands_beside_it_is_taken(name: str, changes: dict[str, Any]) -> None:
     assert busplan.load_profile(name, changes=changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [("paper-4ms", "; latencies in a CSV file are for busplan calibrate"), ("sercos3-servo-8", "")],
+)
+def test_a_kind_without_recordings_says_what_it_reads(name: str, more: str) -> None:
+    plan = busplan.load_profile(name)
+    words = f"any.pcap: busplan reads no recordings of bus.kind {plan.bus.kind}"
+    with pytest.raises(busplan.BusplanError) as refused:
+        busplan.measured(plan, "any.pcap")
+    assert str(refused.value) == words + more
+    with pytest.raises(busplan.BusplanError) as refused:
+        busplan.timeline(plan, recording="any.pcap")
+    assert str(refused.value) == words
