@@ -144,7 +144,10 @@ def test_equation_11_is_for_nodes_that_are_alike_and_read_and_written() -> None:
         keys = {f"payload.{key}": size for key, size in changes.items()}
         return busplan.capacity(busplan.load_profile(name, changes=keys), timing_model="standard").results[0].own
 
-    assert nodes("paper-1ms").nodes_eq11 > 1
+    # (alpha T_s - CTS) over a read and a write with both gaps behind each; alpha is a half.
+    one, sync_us = nodes("paper-1ms", read_bytes=16, write_bytes=64), nodes("paper-1ms").sync_us
+    pair_us = one.read_latency_with_gaps_us + one.write_latency_with_gaps_us
+    assert one.nodes_eq11 == pytest.approx((500 - sync_us) / pair_us)
     assert [nodes("paper-1ms", **{way: 0}).nodes_eq11 for way in ("read_bytes", "write_bytes")] == [None, None]
     assert nodes("gantry-24").nodes_eq11 is None
 
