@@ -53,3 +53,22 @@ def test_each_term_has_its_own_label(kind: str) -> None:
         short = figure.key.removeprefix("cycle_").removesuffix("_us")
         assert figures.term_label(short) == figure.label
     assert figures.term_label(None) == ""
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_a_new_section_sets_no_key_that_it_proposes(kind: str) -> None:
+    bus = kind_named(kind)
+    for variant in ("", *bus.starter.variants):
+        known = bus.hosts(variant)
+        for host in (None, *known):
+            lines = bus.new_section(host, variant).splitlines()
+            keys = [line.removeprefix("# ").partition("=")[0].strip() for line in lines if "=" in line]
+            assert len(keys) == len({*keys}), (variant, host)
+            if host is not None:
+                own, wake_up = (bus.key_of(role).removeprefix("bus.") for role in ("host", "wake-up"))
+                given = {
+                    key: value
+                    for key, value in ((own, known[host].own_us.get(kind)), (wake_up, known[host].jitter_us))
+                    if value and key
+                }
+                assert all(any(line.startswith(f"{key} = {value} ") for line in lines) for key, value in given.items())

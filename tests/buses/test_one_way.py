@@ -72,6 +72,11 @@ def test_what_is_not_sent_takes_no_time_by_hand() -> None:
         changes |= {"bus.requests": requests, "payload.read_bytes": 0, **alone}
         boards = busplan.load_profile("dynamixel-arm-14", changes=changes)
         assert required_us(boards) == pytest.approx(6 * ((9 + 4 + 8) * 11 / 0.0384 + 2 * 1750 + 22))
+    # PROFIBUS has no other request: an exchange is empty one way, with 11 bits less for each of its bytes.
+    whole_us = required_us(busplan.load_profile("profibus-drives-6"))
+    for way, size in (("read", 18), ("write", 10)):
+        drives_us = required_us(busplan.load_profile("profibus-drives-6", changes={f"payload.{way}_bytes": 0}))
+        assert whole_us - drives_us == pytest.approx(6 * size * 11 / 12)
     # EtherCAT: each of 8 drives has 12 bytes less in the frame, of 0.08 us each.
     drives = [with_bytes("ethercat-servo-8", "read", size) for size in (12, 0)]
     assert required_us(drives[0]) - required_us(drives[1]) == pytest.approx(8 * 12 * 0.08)

@@ -302,3 +302,10 @@ def test_a_constant_changes_the_defaults_of_sections_that_nothing_else_touches()
     assert (before.node.response_us, before.payload.overhead_bytes) == (1.63, 20)
     # The overhead is in the file.
     assert (after.node.response_us, after.payload.overhead_bytes) == (2.5, 20)
+
+
+def test_changes_stay_as_they_are_where_one_goes_into_another() -> None:
+    execution = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.0}
+    for _ in range(2):
+        one: Any = busplan.load_profile("paper-4ms", changes={"node.execution": execution, "node.execution.base_us": 9})
+        assert (one.node.execution.base_us, execution["base_us"]) == (9, 30)

@@ -77,23 +77,21 @@ class RecordedCycles(ABC):
 def planned_events(
     events: "Iterable[BusEvent]", figures: Iterable[Figure], *, others: Iterable[str] = (), names: Sequence[str] = ()
 ) -> Iterator[tuple[str, WaterfallEvent]]:
-    """Events of a planned cycle one behind the other, each with its kind.
+    """Events of a planned cycle in their order, each from 0 and with its kind.
 
     `figures` are those of its terms, `others` the kinds that are of other traffic, `names` those of the nodes. Too many
     events raise BusplanError.
     """
     waits = {figure.key: figure.waits_for for figure in figures}
-    start_us = 0.0
     for number, event in enumerate(islice(events, MOST_EVENTS + 1)):
         if number == MOST_EVENTS:
             raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
         if not event.us:
             continue
         node = names[event.node - 1] if event.node and event.node <= len(names) else ""
-        end_us, label = start_us + float(event.us), f"{event.label} of {node}" if node else event.label
+        label = f"{event.label} of {node}" if node else event.label
         awaited: Awaited = "others" if event.kind in others else waits[event.term]
-        yield event.kind, WaterfallEvent(awaited, label, start_us, end_us, node)
-        start_us = end_us
+        yield event.kind, WaterfallEvent(awaited, label, 0.0, float(event.us), node)
 
 
 def from_zero(events: Iterable[WaterfallEvent]) -> tuple[WaterfallEvent, ...]:

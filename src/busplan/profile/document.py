@@ -5,6 +5,7 @@ import sys
 import tomllib
 from codecs import BOM_UTF8
 from collections.abc import KeysView
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -322,7 +323,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     arrays: dict[int, Any] = {}
     for key, value in changes.items():
         table, last = holder(data, key, name=origin.get(key), arrays=arrays)
-        table[last] = value
+        table[last] = deepcopy(value)  # A later change may go into a table among the changes, which is the caller's.
     with constants_changed(tuple(sorted((dict(profile.constants) | constants).items()))):
         result = _checked(data | kept)
     if isinstance(result, Profile):

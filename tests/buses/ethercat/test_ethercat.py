@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Callable
+from functools import cache
 from math import sqrt
 from pathlib import Path
 from statistics import fmean, stdev
@@ -16,7 +17,10 @@ from pydantic import ValidationError
 
 import busplan
 from busplan.buses import kind_named
+from busplan.buses.ethercat.cycle import EthercatCycle
 from busplan.errors import BusplanError
+from busplan.questions.fit.certainty import deciding_cycle
+from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
 from tests.registers import at_least
 
@@ -72,6 +76,7 @@ def loop_delays_us(plan: busplan.Profile, update: str) -> tuple[float, float]:
     return figures.delay_x_us, figures.delay_y_us
 
 
+@cache
 def comparisons() -> list[Any]:
     """Every published figure of EtherCAT beside the computed one."""
     (kind,) = busplan.evidence("ethercat").kinds
@@ -120,6 +125,9 @@ def test_three_frames_in_a_cycle() -> None:
     # 74 drives fill the first frame with 1480 bytes, 26 go with a camera, and the other camera has no room beside it.
     packed = busplan.EthercatFigures.of(result)
     assert (packed.frames, packed.process_bytes) == (3, 100 * 20 + 2 * 900)
+    for one, size, padding in ((plan, 3800 + 3 * 12, 0), (profile(payload__read_bytes=1, bus__nodes=1), 24, 20)):
+        packing = EthercatCycle(network_of(one), "last-byte").packing
+        assert (packing.datagrams_bytes, packing.padding_bytes) == (size, padding)
     last = 52 + 900
     sent = (3 * 52 + 3800) * BYTE_US
     assert result.required_us == pytest.approx(20 + sent + 102 * E_BUS_US)
@@ -128,6 +136,53 @@ def test_three_frames_in_a_cycle() -> None:
     events = busplan.timeline(plan).cycle_events
     assert [event.label for event in events if event.kind == "overhead"] == [f"headers of frame {n}" for n in (1, 2, 3)]
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
+
+
+def test_commands_arrive_with_the_frames_of_their_devices() -> None:
+    drives = {"nodes": 100, "read_bytes": 20, "write_bytes": 12, "cable_length_m": 2.0}
+    cameras = {"nodes": 2, "axes": 0, "read_bytes": 900, "write_bytes": 1}
+    plan = grouped({"name": "drives", **drives}, {"name": "cameras", **cameras}, master_jitter_us=3.0)
+    cycle = deciding_cycle(network_of(plan))
+    frames_us = [(52 + size) * BYTE_US for size in (74 * 20, 26 * 20 + 900, 900)]
+    for node, frames in ((1, 1), (74, 1), (75, 2), (100, 2), (101, 2), (102, 3)):
+        way_us = node * E_BUS_US / 2 + min(node, 100) * 0.01
+        assert cycle.arrival_us(node) == pytest.approx(20 + 3 + sum(frames_us[:frames]) + way_us)
+
+
+def test_the_last_byte_passes_each_cable_and_device_there_and_back() -> None:
+    plan = grouped(
+        {"name": "drives", "nodes": 2, "read_bytes": 8, "write_bytes": 8, "cable_length_m": 10.0, "delay_us": 0.7},
+        {"name": "io", "nodes": 1, "axes": 0, "read_bytes": 1, "write_bytes": 1, "cable_length_m": 30.0},
+    )
+    there = [event for event in busplan.timeline(plan).cycle_events if event.kind in ("cable", "device")]
+    expected = (
+        ("cable to", 1, 0.05),
+        ("way to", 1, 0.7),
+        ("cable to", 2, 0.05),
+        ("way to", 2, 0.7),
+        ("cable to", 3, 0.15),
+        ("way to", 3, E_BUS_US / 2),
+        ("way back from", 3, E_BUS_US / 2),
+        ("cable back from", 3, 0.15),
+        ("way back from", 2, 0.7),
+        ("cable back from", 2, 0.05),
+        ("way back from", 1, 0.7),
+        ("cable back from", 1, 0.05),
+    )
+    assert [(event.label, event.node) for event in there] == [
+        (f"{label} device {node}", node) for label, node, _ in expected
+    ]
+    assert [event.duration_us for event in there] == pytest.approx([us for *_, us in expected])
+
+
+def test_one_more_device_may_open_a_short_frame_which_arrives_sooner() -> None:
+    # 14 devices of 100 bytes fill a frame of 1452 bytes, and the 15th has one of 152.
+    plan, sent_us = profile(payload__read_bytes=100, bus__nodes=15), 20 + (1452 + 152) * BYTE_US + 15 * E_BUS_US
+    # Vendors count the last frame twice: 8 devices have one of 852 bytes and fit, and 9 to 14 take longer than 15.
+    for model, received, most in (("last-byte", 0, 15), ("vendors", 152, 8)):
+        at = busplan.load_profile(plan, changes={"cycle.period_us": sent_us + received * BYTE_US + 1})
+        (result,) = busplan.capacity(at, timing_model=[model]).results
+        assert (result.fits, result.max_nodes) == (True, most)
 
 
 @settings(max_examples=at_least(6, 40))
@@ -356,6 +411,16 @@ def test_a_loop_takes_whole_periods_with_distributed_clocks() -> None:
     free = loops(profile())
     assert free["command"] == pytest.approx(500 + own_us - 20 * BYTE_US + 40)
     assert free["feedback"] == pytest.approx(500 + own_us - 20 * BYTE_US + 3 * 0.1507)
+
+
+def test_the_slowest_group_decides_how_many_periods_a_loop_has() -> None:
+    # SYNC0 at 250 us: drives take a period; outputs that need 300 us, and are not read, miss one SYNC0.
+    drives = {"name": "drives", "nodes": 2, "read_bytes": 8, "write_bytes": 8}
+    outputs = {"name": "outputs", "nodes": 1, "axes": 0, "read_bytes": 0, "write_bytes": 4}
+    for base_us, periods in ((40.0, 1 + 0 + 1), (300.0, 1 + 1 + 1)):
+        slow = {**outputs, "execution": {"kind": "linear", "grade": "measured", "base_us": base_us, "per_byte_us": 0.0}}
+        cycle = deciding_cycle(network_of(grouped(drives, slow, distributed_clocks=True)))
+        assert (cycle.loop_periods(at_sync=True), cycle.loop_periods(at_sync=False)) == (periods, 2)
 
 
 def test_a_frame_takes_no_sample_that_it_triggers_itself() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.errors import BusplanError
+from busplan.questions.fit.network import network_of
 from tests.oracles.ethercat_recording import first_cycles
 from tests.registers import at_least
 
@@ -205,6 +206,11 @@ def test_the_fullest_cycle_need_not_be_that_in_which_a_window_frame_ends_last(
         profile(groups, distributed_clocks=True, master_jitter_us=1e-6), changes={"group.g1.sync_window_us": window_us}
     )
     assert ("sync_window" not in deciding(plan).exceeded) == is_kept
+    window = kind_named("ethercat").limit("sync_window")
+    assert window is not None
+    words = f"g1: frames move 16.0 us against SYNC0, and a drive allows {window_us:g} us: "
+    allowed = "a jitter of 0.001 us is allowed" if is_kept else "no jitter is small enough"
+    assert window.words(network_of(plan)) == words + allowed
 
 
 @pytest.mark.slow

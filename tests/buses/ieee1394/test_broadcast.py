@@ -67,6 +67,31 @@ def test_the_kit_by_hand_with_both_kinds_of_request() -> None:
     assert required_us(cycle__broadcast_request="isochronous") == pytest.approx(by_hand_us, rel=1e-12)
 
 
+def test_boards_that_are_only_read_or_only_written_by_hand() -> None:
+    none, both = ({f"group.{name}.{way}_bytes": 0 for name in ("full", "partial")} for way in ("read", "write"))
+    assert required_us(none) == pytest.approx(QUERY_US + WRITE_US + RESET_US, rel=1e-12)
+    boards_us = 8 * (SUB_US + ARBITRATION_US + data_us(28 + 128))
+    assert required_us(both) == pytest.approx(QUERY_US + boards_us + RESET_US + HUB_US + RESET_US, rel=1e-12)
+    events = busplan.timeline(kit(none)).events
+    assert [event.label for event in events if event.transaction] == [
+        "host arbitration",
+        "commands to all nodes",
+        "hub acknowledge",
+    ]
+    mean_us, gap_term_us = 0.827025, 2 * (63 - 21) / 98.304
+    # The query, and the write; or the query, eight broadcasts and two packets of the hub.
+    for changes, packets in ((none, 2), (both, 11)):
+        figures = standard(kit(changes))
+        assert figures.bias_us == pytest.approx(packets * (mean_us + gap_term_us), abs=1e-3)
+    host = {"host.transaction_us": 30.0, "host.uncertainty_us": 1.0}
+    doubts = [
+        {doubt.key: doubt.us for doubt in standard(kit({**changes, **host})).doubts}["host.transaction_us"]
+        for changes in (none, both)
+    ]
+    assert doubts == pytest.approx([1, 2])
+    assert [row.transaction for row in busplan.latency(kit(none)).transactions] == ["write", "write"]
+
+
 SMALL = {f"group.{name}.read_bytes": 4 for name in ("full", "partial")}
 
 

@@ -242,6 +242,32 @@ def test_the_ends_by_hand(adapter: object, least_us: float, most_us: float) -> N
     assert ends_us(servo(bus__adapter=adapter)) == pytest.approx((least_us, most_us))
 
 
+def test_the_ends_of_exchanges_by_hand() -> None:
+    # Six boards of Modbus at 115.2 kbit/s: 13 + 4 and 5 + 4 bytes of 11 bits, twice 1750 us of silence, 50 us.
+    boards = servo(
+        bus__protocol="modbus-rtu",
+        bus__requests="exchange",
+        bus__nodes=6,
+        bus__bit_rate_kbit_s=115.2,
+        bus__adapter={"timer_us": 10_000.0, "frame_us": 0.0},
+    )
+    exchange_us = (17 + 9) * 11 / 0.1152 + 2 * 1750 + 50
+    assert ends_us(boards) == pytest.approx((exchange_us + 5 * 10_000, 6 * (exchange_us + 10_000)))
+    # An answer of 9 bytes fills a packet of 3, and goes at once.
+    full = busplan.load_profile(boards, changes={"bus.adapter.packet_bytes": 3})
+    assert ends_us(full)[0] == pytest.approx(6 * exchange_us)
+
+
+@pytest.mark.parametrize(("packet_bytes", "is_full"), [(13, True), (14, True), (15, False), (6, False)])
+def test_of_requests_that_share_data_either_answer_may_fill_its_packet(packet_bytes: int, is_full: bool) -> None:
+    # A servo's 5 bytes come as 2 and as 3, each beside 11 of its answer; the longer of the two has the shorter wait.
+    adapter = {"timer_us": 1000.0, "packet_bytes": packet_bytes, "frame_us": 0.0}
+    least_us, _ = ends_us(servo(bus__reads=2, payload__read_bytes=5, bus__adapter=adapter))
+    mean_us, longer_us = ((14 + 11 + size) * 10 + 50 for size in (2.5, 3))
+    wait_us = 0 if is_full else 1000 - longer_us
+    assert least_us == pytest.approx(6 * mean_us + 5 * wait_us + 3 * 1000)
+
+
 @pytest.mark.parametrize(("host_us", "seen_us"), [(300.0, 0.0), (680.0, 0.0), (800.0, 120.0)])
 def test_the_hosts_time_hides_in_the_wait_of_the_first_write(host_us: float, seen_us: float) -> None:
     least_us, most_us = ends_us(servo(bus__adapter="ftdi-low-latency", bus__host_us=host_us))

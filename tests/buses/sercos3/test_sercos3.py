@@ -9,6 +9,8 @@ import pytest
 
 import busplan
 from busplan import Profile
+from busplan.questions.fit.certainty import deciding_cycle
+from busplan.questions.fit.network import network_of
 
 TEXT = """\
 schema_version = 1
@@ -214,6 +216,24 @@ def test_a_loop_on_the_host_rests_on_the_feedback_of_the_cycle_before() -> None:
     last_us = 1000 - at_us - ring_us - max(2.56, 8 * 0.4 - jitter_us) - jitter_us - 60
     assert delay_us("on_arrival", bus__timing_method="at-last") == pytest.approx(1000 + effect_us - last_us)
     assert delay_us("next_sync", bus__timing_method="at-last") == 1000
+
+
+@pytest.mark.parametrize(
+    ("changes", "due_us"),
+    # Feedback is due when the first AT begins: behind the MDT, the channel that is open, or the devices' least time.
+    [
+        ({}, 20.72 + 1.98),
+        ({"bus__at_start_us": 20.0}, 20.72 + 1.98),
+        ({"bus__at_start_us": 90.0}, 90.0),
+        ({"bus__timing_method": "mdt-ucc-at"}, 20.72 + 1.98),
+        ({"bus__timing_method": "mdt-ucc-at", "cycle__nonperiodic_us": 130.0}, 20.72 + 2 * 1.98 + 130 + 17.68),
+    ],
+)
+def test_feedback_is_due_when_the_first_at_begins(changes: dict[str, Any], due_us: float) -> None:
+    keys = {"cycle.nonperiodic_us": 0} | {key.replace("__", "."): to for key, to in changes.items()}
+    cycle = deciding_cycle(network_of(busplan.load_profile("sercos3-servo-8", changes=keys)))
+    # All sample 60 us before; the first byte leaves 0.32 us behind the start of the cycle.
+    assert cycle.sampled_us() == pytest.approx(0.32 + due_us - 60)
 
 
 def test_the_order_of_the_cycle_is_that_of_the_method() -> None:

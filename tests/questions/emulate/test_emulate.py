@@ -368,6 +368,117 @@ def test_ethercat_frames_are_those_of_another_emulator(seed: int, machines: Mach
                 assert set(counter) == {devices}
 
 
+THREE = """\
+schema_version = 1
+name = "three"
+[bus]
+kind = "ethercat"
+distributed_clocks = true
+master_us = 20
+{}
+[cycle]
+period_us = 1000
+[[group]]
+name = "io"
+nodes = 1
+axes = 0
+every = 2
+read_bytes = 2
+write_bytes = 0
+[[group]]
+name = "drives"
+nodes = 2
+axes = 0
+read_bytes = 6
+write_bytes = 4
+"""
+BRD_STATE, APWR_TIME, ARMW_TIME = (7, 0x1300003, 2, 3), (2, 0x9100003, 4, 1), (13, 0x9100003, 4, 3)
+ACONTIS = [(0, 0, 4, 0), APWR_TIME, BRD_STATE, ARMW_TIME]
+
+
+@pytest.mark.parametrize(
+    ("bus", "own", "both", "drives"),
+    # An LRW counts 1 for each device that it reads, and 2 for each that it writes; io has no outputs.
+    [
+        ('master = "SOEM"', [(14, 0x9101001, 8, 3)], [(12, 0x10000, 22, 7)], [(12, 0x10002, 20, 6)]),
+        ('master = "IgH"', [BRD_STATE, (14, 0x9101001, 4, 3)], [(12, 0x10000, 22, 7)], [(12, 0x10002, 20, 6)]),
+        (
+            'master = "ethercrab"',
+            [(14, 0x9101001, 8, 3), *((4, 0x1301001 + place, 2, 1) for place in range(3))],
+            [(12, 0x10000, 22, 7)],
+            [(12, 0x10002, 20, 6)],
+        ),
+        (
+            'master = "TwinCAT"',
+            [(0, 0, 4, 0), BRD_STATE, (10, 0x9000000, 1, 3), ARMW_TIME],
+            [(12, 0x10000, 14, 7)],
+            [(12, 0x10002, 12, 6)],
+        ),
+        ('master = "acontis"', ACONTIS, [(12, 0x10000, 14, 7)], [(12, 0x10002, 12, 6)]),
+        ("", ACONTIS, [(12, 0x10000, 22, 7)], [(12, 0x10002, 20, 6)]),
+        (
+            'housekeeping_bytes = [3, 5]\nprocess_data = "LRD-LWR"',
+            [(0, 0, 3, 0), (0, 0, 5, 0)],
+            [(10, 0x10000, 14, 3), (11, 0x810000, 8, 2)],
+            [(10, 0x10002, 12, 2), (11, 0x810002, 8, 2)],
+        ),
+    ],
+)
+def test_datagrams_of_each_master_by_hand(
+    bus: str, own: list[Any], both: list[Any], drives: list[Any], tmp_path: Path
+) -> None:
+    """Command, address, data bytes and working counter of each, as returned."""
+    (tmp_path / "three.toml").write_text(THREE.format(bus))
+    seen = [packet for _, packet in packets(busplan.emulate(tmp_path / "three.toml", cycles=4).content)]
+    assert [datagrams(packet) for packet in seen[1::2]] == [own + both, own + drives] * 2
+    for sent, back in zip(seen[::2], seen[1::2], strict=True):
+        # Each device adds 1 to an address by place, and what comes back is what was sent but for states.
+        sent_parts, back_parts = datagrams(sent), datagrams(back)
+        passed = {address: address - 3 if command in (2, 7, 13) else address for command, address, *_ in back_parts}
+        assert sent_parts == [(command, passed[address], size, 0) for command, address, size, _ in back_parts]
+        at, states = 16, 0
+        for _, address, size, _ in back_parts:
+            data = [packet[at + 10 : at + 10 + size] for packet in (sent, back)]
+            is_state = address >> 16 == 0x130
+            assert data[1] == (b"\x08\x00" if is_state else data[0])
+            assert not is_state or data[0] == b"\0\0"
+            at, states = at + 12 + size, states + is_state
+
+
+def test_an_ethercat_frame_returns_after_its_wire_its_way_and_half_to_all_of_the_host(tmp_path: Path) -> None:
+    text = THREE.format('master = "SOEM"\nmailbox_polls = 2\nmailbox_bytes = 16\nmaster_jitter_us = 30')
+    (tmp_path / "three.toml").write_text(text)
+    stamps: dict[Any, list[float]] = defaultdict(list)
+    for time_ns, packet in packets(busplan.emulate(tmp_path / "three.toml", cycles=300).content):
+        (command, address, size, _), *_ = datagrams(packet)
+        cycle, time_us = time_ns // 1_000_000, time_ns / 1000 % 1000
+        assert packet[17] == cycle % 256
+        # A frame of process data begins with the clocks; two polls of the three devices follow it, in turn.
+        place = 0 if command == 14 else 1 + (address - 0x10801001 - 2 * cycle) % 3
+        assert command == 14 or (command, size) == (4, 16)
+        stamps[place, bool(packet[6] & 2)].append(time_us)
+    assert {key: len(times) for key, times in stamps.items()} == {
+        (n, way): 300 for n in range(3) for way in (False, True)
+    }
+    starts = stamps[0, False]
+    assert 0 <= min(starts) < 1
+    assert 29 < max(starts) < 30
+    # 40 bytes, 20 of the clocks, 12 and 22 or 20 of the process data; a poll has 84, the least on the wire.
+    for odd, size in ((0, 22), (1, 20)):
+        wire_us, copy_us, way_us = (72 + size) * 0.08, size * 0.0035333, 3 * 2 * 0.698143
+        hosts = [
+            back - sent - wire_us - copy_us - way_us
+            for sent, back in zip(starts[odd::2], stamps[0, True][odd::2], strict=True)
+        ]
+        assert 10 - 0.002 < min(hosts) < 10.5
+        assert 19.5 < max(hosts) < 20.002
+        for number in (1, 2):
+            polls = stamps[number, False][odd::2]
+            assert [poll - start for poll, start in zip(polls, starts[odd::2], strict=True)] == pytest.approx(
+                [wire_us + (number - 1) * 84 * 0.08] * 150, abs=0.003
+            )
+
+
 def test_state_checks_of_many_devices_fill_frames_of_their_own(tmp_path: Path) -> None:
     text = (PROFILES / "ethercat-servo-8.toml").read_text()
     text = text.replace('master = "SOEM"', 'master = "ethercrab"').replace("nodes = 8 ", "nodes = 250 ")

@@ -283,6 +283,7 @@ def test_what_port_times_do_not_say_is_said(tmp_path: Path) -> None:
     whole = start_up(HOPS_NS, clocks_ns=CLOCKS_NS)
     assert "read 4 times without the broadcast write" in remark(whole[2:])
     assert "the write passed 4 devices, and those of 3 were read" in remark(whole[:-2])
+    assert "No delays of devices by port times: there is 1 device." in remark(start_up((), clocks_ns=(5,)))
     ports = b"".join(value.to_bytes(4, "little") for value in (10, 500, 300, 0))
     branch = (-500.0, register(FPRD, 0x1001, 0x900, ports, 1, returned=True))
     assert "times of 3 ports: it is a branch" in remark([*whole, branch])
@@ -357,6 +358,9 @@ def test_few_cycles_have_no_period(tmp_path: Path) -> None:
     answer = of_machine(Machine(), tmp_path, cycles=5)
     assert answer.shows_nothing == ("it has 5 cycles, but a period needs at least 10",)
     assert (figure(answer, "master's time").events, figure(answer, "master's time").verdict) == (5, "not shown")
+    reasons = {one.quantity: one.hidden for one in answer.figures if one.hidden}
+    few = "5 cycles, but a period needs at least 10"
+    assert {name: reasons[name] for name in ("period", "latest start")} == {"period": few, "latest start": few}
 
 
 # --- the command ----------------------------------------------------------------------------------------

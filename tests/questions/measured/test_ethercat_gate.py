@@ -2,6 +2,7 @@
 
 import tomllib
 from dataclasses import replace
+from math import hypot
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -13,12 +14,15 @@ from hypothesis import strategies as st
 import busplan
 from tests.oracles.ethercat_recording import (
     FRMW,
+    LRD,
     LRW,
     Datagrams,
     Machine,
+    ethernet,
     pcapng,
     planned,
     simulated,
+    start_up,
     starts_and_hosts,
     statistics,
 )
@@ -93,6 +97,13 @@ def judged(
     assert answer.passed == (not any(finding.severity == "error" for finding in findings))
     words = {finding.problem.partition(": ")[2].removeprefix("not shown: "): finding.code for finding in findings}
     return busplan.measured(profile, capture), {text.partition(": ")[0]: code for text, code in words.items()}
+
+
+def compared(packets: Packets, folder: Path, plan: str = FOUR) -> busplan.MeasuredAnswer:
+    """The answer alone."""
+    (folder / "capture.pcapng").write_bytes(pcapng(packets))
+    (folder / "plan.toml").write_text(plan)
+    return busplan.measured(folder / "plan.toml", folder / "capture.pcapng")
 
 
 def recorded(answer: busplan.MeasuredAnswer, quantity: str) -> float | None:
@@ -191,6 +202,122 @@ def test_lost_frames_and_wrong_counters_count_against_the_same_limit(tmp_path: P
     assert judged(simulated(machine, 1000), tmp_path, plan=FOUR + "[limits]\nmissed_cycles = 2\n")[1] == {}
 
 
+def in_turn(
+    trips_us: dict[int, float], late_us: dict[int, float], *, usual_us: tuple[float, float] = (50.0, 46.0)
+) -> Packets:
+    """A capture of `FOUR`: cycles of 104 and 84 bytes return after the usual times, but some, and some start late."""
+    packets = []
+    for number in range(201):
+        (frame,) = MACHINE.schedule[number % 2]
+        start_us = 1000.0 * number + late_us.get(number, 0.0)
+        back_us = start_us + trips_us.get(number, usual_us[number % 2])
+        for time, counters, returned in ((start_us, (), False), (back_us, (30 - number % 2, 8), True)):
+            packets.append((time, ethernet(frame, index=number % 256, counters=counters, returned=returned)))
+    return packets
+
+
+def test_every_figure_of_a_capture_by_hand(tmp_path: Path) -> None:
+    answer = compared(in_turn({30: 53.5, 71: 57.0}, {100: 7.5}), tmp_path)
+    # On the wire 40 bytes, 12 of the process data and 20 of the clocks; 8 devices of 0.698 us; 3.533 ns for a byte.
+    way_us, copies_us = 16 * 0.698, (104 * 0.0035333, 84 * 0.0035333)
+    wires_us = (72 + 104) * 0.08, (72 + 84) * 0.08
+    trips_us = [25 + wire_us + copy_us + way_us for wire_us, copy_us in zip(wires_us, copies_us, strict=True)]
+    host_us = 57 - wires_us[1] - copies_us[1] - way_us
+    # Measured devices err by 10 ns / sqrt(12) each way, bytes by 0.94045 ns, the master by 0.1 us, stamps by 0.25 us.
+    common = 16 * 0.010 / 12**0.5 / 8**0.5, 0.1, 0.25
+    doubts_us = [2 * hypot(*common, size * 0.00094045) for size in (104, 84)]
+    clock_us = 2 * 1000 * 100e-6 / 3**0.5
+    expected: list[tuple[str, float | None, float | None, float | None, int, str | None]] = [
+        ("period", 1000, 1000, clock_us, 201, "within"),
+        ("standard deviation of the period", None, 0.75, None, 200, None),
+        ("latest start", 10, 7.5, 0.5, 201, "within"),
+        ("cycles without a frame", 0, 0, None, 201, "within"),
+        ("round trip, median", None, 50, None, 101, None),
+        ("round trip with g0 and g2", trips_us[0], 53.5, doubts_us[0], 101, "outside"),
+        ("master's time", 25, host_us, doubts_us[0], 201, "outside"),
+        ("frames in a cycle with g0 and g2", 1, 1, None, 101, "within"),
+        ("datagrams of a cycle with g0 and g2", 136, 136, None, 101, "within"),
+        ("round trip with g0 and g1", trips_us[1], 57, doubts_us[1], 100, "outside"),
+        ("frames in a cycle with g0 and g1", 1, 1, None, 100, "within"),
+        ("datagrams of a cycle with g0 and g1", 116, 116, None, 100, "within"),
+        ("lost frames", 0, 0, None, 201, "within"),
+        ("wrong working counters", 0, 0, None, 201, "within"),
+    ]
+    found = answer.figures
+    assert [(one.quantity, one.events, one.verdict) for one in found] == [(row[0], *row[4:]) for row in expected]
+    for place, name in enumerate(("planned", "recorded", "uncertainty"), start=1):
+        values = [getattr(one, name) for one in found]
+        assert [value is None for value in values] == [row[place] is None for row in expected], name
+        assert [value or 0 for value in values] == pytest.approx([row[place] or 0 for row in expected], abs=2e-3)
+    by_name = {one.quantity: one for one in found}
+    assert by_name["master's time"].note == "median 24.4: round trip less wire, devices and cables"
+    assert by_name["datagrams of a cycle with g0 and g2"].note == "LRW 104 FRMW 8"
+    # Frames are numbered from 1, and each is there twice; a trip is at the frame that is sent.
+    worst = {name: (one.first_s, one.first_frame, one.worst_frame) for name, one in by_name.items() if one.first_s}
+    assert worst == {
+        "round trip with g0 and g2": (0.030, 61, 61),
+        "master's time": (0.030, 61, 143),
+        "round trip with g0 and g1": (0.071, 143, 143),
+    }
+    assert by_name["latest start"].worst_frame == 201
+    # Rounded up to a nanosecond; of the worst case nobody knows U.
+    assert answer.edits == {
+        "bus.master_us": pytest.approx(33.056, abs=1e-9),
+        "bus.master_grade": "measured",
+        "bus.master_uncertainty_us": None,
+        "bus.master_jitter_us": pytest.approx(7.5, abs=0.0011),
+        "bus.master_jitter_cycles": 201,
+    }
+    # Four of five cycles take 24.384 us at most, as most of those do: the steps of the stamps alone are doubted.
+    often = busplan.measured(tmp_path / "plan.toml", tmp_path / "capture.pcapng", quantile=0.8).edits
+    assert (often["bus.master_us"], often["bus.master_uncertainty_us"]) == pytest.approx((24.385, 0.25), abs=1e-3)
+
+
+def test_a_master_that_takes_less_than_nothing_shows_other_devices(tmp_path: Path) -> None:
+    # 0.34 us sooner than wire, copy and devices take, in the cycles that take longest.
+    answer = compared(in_turn({}, {}, usual_us=(25.2, 23.6)), tmp_path)
+    assert recorded(answer, "master's time") == pytest.approx(-0.3448, abs=1e-4)
+    words = "Round trips are shorter than with the profile's devices: the machine has fewer or faster ones."
+    assert words in answer.remarks
+    assert "bus.master_us" not in answer.edits
+
+
+@pytest.mark.parametrize(("cycles", "is_missing"), [(9, False), (10, True)])
+def test_ten_cycles_in_a_row_are_operation(cycles: int, is_missing: bool, tmp_path: Path) -> None:
+    packets = simulated(MACHINE, 60)
+    for kept in (
+        [packet for packet in packets if packet[0] < 29_900 or packet[0] > (60 - cycles) * 1000 - 100],
+        [packet for packet in packets if packet[0] < cycles * 1000 - 100 or packet[0] > 29_900],
+    ):
+        answer = compared(kept, tmp_path)
+        assert recorded(answer, "cycles without a frame") == (30 - cycles if is_missing else 0)
+        words = f"{cycles} frames of process data at its ends are left out"
+        assert any(words in remark for remark in answer.remarks) is not is_missing
+
+
+@pytest.mark.parametrize(
+    ("nodes", "planned", "size", "edit"),
+    # A bit of each device at most, or what the plan gives the master; else it is process data.
+    [(8, None, 1, [1, 8]), (8, None, 2, None), (9, None, 2, [2, 8]), (8, [8, 5], 5, None), (8, [8, 5], 1, [8])],
+)
+def test_a_read_of_the_state_of_all_mailboxes_is_the_masters(
+    nodes: int, planned: list[int] | None, size: int, edit: list[int] | None, tmp_path: Path
+) -> None:
+    plan = plan_of((nodes, 4, 1))
+    if planned is not None:
+        plan = plan.replace("master_us", f"housekeeping_bytes = {planned}\nmaster_us", 1)
+    frame = ((LRW, 0x10000, 8 * nodes), (LRD, 0x900_0000, size), (FRMW, 0x910_1001, 8))
+    answer = compared(simulated(replace(MACHINE, devices=nodes, schedule=((frame,),)), 40), tmp_path, plan=plan)
+    assert answer.edits.get("bus.housekeeping_bytes") == edit
+
+
+@pytest.mark.parametrize(("trip_us", "is_early"), [(12.5, False), (12.0, True)])
+def test_a_frame_is_back_no_sooner_than_it_is_sent(trip_us: float, is_early: bool, tmp_path: Path) -> None:
+    # 164 bytes without the gap of 12 are 13.12 us; of two stamps in steps of 0.5 us each may err by one.
+    answer = compared(in_turn({30: trip_us, 32: 50.5}, {}), tmp_path)
+    assert any("1 frame returned sooner than it takes" in remark for remark in answer.remarks) is is_early
+
+
 @pytest.mark.parametrize("first", [0, 1])
 def test_two_units_in_turn_are_one_frame_a_cycle(tmp_path: Path, first: int) -> None:
     machine = replace(MACHINE, host_us=23.0, host_spread_us=0.5, schedule=(cycle(64),))
@@ -234,12 +361,15 @@ def test_a_cycle_without_process_data_has_no_frame_to_miss(tmp_path: Path) -> No
     assert recorded(answer, "cycles without a frame") == 2
 
 
-def test_a_master_that_goes_on_with_its_own_count_misses_a_cycle_and_no_more(tmp_path: Path) -> None:
-    schedule = (cycle(136), cycle(16), cycle(16), cycle(16))
-    before, behind = (replace(SHORT_LINE, schedule=schedule[shift:] + schedule[:shift]) for shift in (0, 3))
+@pytest.mark.parametrize(("every", "shift"), [(4, 3), (12, 1)])
+def test_a_master_that_goes_on_with_its_own_count_misses_a_cycle_and_no_more(
+    every: int, shift: int, tmp_path: Path
+) -> None:
+    schedule = (cycle(136), *[cycle(16)] * (every - 1))
+    before, behind = (replace(SHORT_LINE, schedule=schedule[shift:] + schedule[:shift]) for shift in (0, shift))
     packets = [packet for packet in simulated(before, 600) if packet[0] < 299_500]
     packets += [packet for packet in simulated(behind, 600) if packet[0] > 300_500]
-    answer, codes = judged(packets, tmp_path, plan=QUARTERS)
+    answer, codes = judged(packets, tmp_path, plan=plan_of((2, 4, 1), (2, 30, every)))
     assert codes == {"cycles without a frame": "BP401"}
     assert recorded(answer, "cycles without a frame") == 1
 
@@ -292,6 +422,43 @@ def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
     assert next(figure.events for figure in answer.figures if figure.quantity == "period") == 400
 
 
+def test_each_group_has_the_mean_of_its_devices_by_port_times(tmp_path: Path) -> None:
+    of_ports, _, _ = plan_of((1, 8, 1), (2, 8, 1), (1, 8, 1), (1, 8, 1)).rpartition("delay_us")
+    plan = of_ports.replace('name = "g2"', 'name = "g2"\ncable_length_m = 200')
+    # Two starts of the machine: means of 0.6, 1.0, 0.8 and 0.7 us. A start before them had fewer devices.
+    starts = (
+        start_up(hops_ns, clocks_ns=tuple(range(5, 6 + len(hops_ns))))
+        for hops_ns in ((300, 300), (500, 900, 800, 600), (700, 1100, 800, 800))
+    )
+    started = [(time - 1000 * (2 - place), frame) for place, start in enumerate(starts) for time, frame in start]
+    # Only the delays of the two devices of g1 are changed; g2 has a cable of 1 us one way.
+    line_us = 2 * (0.698 + 0.6 + 1.0 + 0.698 + 1.0 + 0.7)
+    machine = replace(
+        SHORT_LINE, jitter_us=0.5, host_us=20.0, host_spread_us=0.0, devices=5, line_us=line_us, schedule=(cycle(80),)
+    )
+    answer = compared(started + simulated(machine, 50), tmp_path, plan=plan)
+    step_us = 0.010 / 12**0.5
+    shown = [figure for figure in answer.figures if "delay of device" in figure.quantity]
+    assert [(figure.quantity, figure.verdict, figure.events) for figure in shown] == [
+        ("delay of device 2", None, 2),
+        ("delay of device 3", None, 2),
+        ("mean delay of devices 2 to 3", "outside", 2),
+        ("delay of device 4", "within", 2),
+        ("delay of device 5", "within", 2),
+    ]
+    assert [figure.recorded for figure in shown] == pytest.approx([0.6, 1.0, 0.8, 0.8, 0.7])
+    # Device 5 is planned with the mean of 14 of 100BASE-TX, 0.6981 us, and errs as one of them, by 0.1233 us.
+    assert [figure.planned for figure in shown] == pytest.approx([0.698, 0.698, 0.698, 1.698, 0.6981], abs=0.0001)
+    assert [figure.uncertainty for figure in shown] == pytest.approx(
+        [2 * step_us * root for root in (2**0.5, 2**0.5, 1, 2**0.5)] + [2 * hypot(0.1233, step_us)], abs=0.0001
+    )
+    # What is shorter than its planned cable changes nothing.
+    assert {key: value for key, value in answer.edits.items() if key.endswith("delay_us")} == pytest.approx(
+        {"group.g1.delay_us": 0.8, "group.g3.delay_us": 0.7}
+    )
+    assert answer.edits["bus.master_us"] == pytest.approx(20, abs=0.02)
+
+
 @settings(max_examples=at_least(10, 80))
 @given(
     st.sampled_from(["uniform", "normal", "exponential"]),
@@ -324,8 +491,9 @@ def test_the_worst_start_is_within_its_u(tmp_path: Path) -> None:
 
 
 def test_stamps_of_no_port_say_no_time(tmp_path: Path) -> None:
-    packets = simulated(MACHINE, 1000)
-    back_at_once = [(time - 35 * bool(frame[6] & 2), frame) for time, frame in packets]
+    # Frames of 800 bytes and of 40, whose trips would show the time of a byte.
+    packets = simulated(replace(MACHINE, schedule=(cycle(800), cycle(40))), 1000)
+    back_at_once = [(time - 95 * bool(frame[6] & 2), frame) for time, frame in packets]
     coarse = [(time // 1000 * 1000, frame) for time, frame in packets]
     in_bursts = [(time // 20_000 * 20_000 + place % 40, frame) for place, (time, frame) in enumerate(packets)]
     at_one_time = [(0.0, frame) for _, frame in packets]
@@ -335,7 +503,7 @@ def test_stamps_of_no_port_say_no_time(tmp_path: Path) -> None:
         (in_bursts, "stamped in bursts"),
         (at_one_time, "stamped in bursts"),
     ):
-        answer, codes = judged(stamped, tmp_path)
+        answer, codes = judged(stamped, tmp_path, plan=plan_of((8, 5, 1), (2, 190, 2)))
         assert set(codes.values()) == {"BP403"}
         assert words in " ".join(answer.shows_nothing)
         assert answer.edits == {}

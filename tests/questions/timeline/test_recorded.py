@@ -398,6 +398,107 @@ def test_shares_of_an_ethercat_cycle_are_those_of_the_machine(folder: Path, seed
     assert shares["nodes"].recorded_us + cables_us == pytest.approx(line_us, abs=doubt_us + 0.01)
 
 
+FRAMES = ((12, 0x10000, 700), (14, 0, 8)), ((12, 0x20000, 600),)
+WIRE_US = (700 + 12 + 8 + 12 + 40) * 0.08, (600 + 12 + 40) * 0.08
+"""61.76 and 52.16 us."""
+
+
+def of_two_frames(back_us: tuple[float | None, float | None]) -> bytes:
+    """A capture of cycles with two frames, the second sent 100 us after the first; in the eighth they return so."""
+    packets = []
+    for cycle in range(12):
+        returns_us = back_us if cycle == 7 else (70.0, 175.0)
+        for place, (datagrams, after_us) in enumerate(zip(FRAMES, returns_us, strict=True)):
+            counters = (3,) * len(datagrams)
+            sent = ethercat_recording.ethernet(datagrams, index=place, counters=counters)
+            packets.append((1000.0 * cycle + 100.0 * place, sent))
+            if after_us is not None:
+                back = ethercat_recording.ethernet(datagrams, index=place, counters=counters, returned=True)
+                packets.append((1000.0 * cycle + after_us, back))
+    return ethercat_recording.pcapng(sorted(packets))
+
+
+WAY_US = 0.2, 2 * 2 * 0.698143
+"""Two cables of 10 m there and back, and two devices."""
+
+
+def test_waits_of_an_ethercat_cycle_by_hand(folder: Path) -> None:
+    plan = busplan.load_profile(
+        "ethercat-servo-8",
+        changes={"bus.nodes": 2, "payload.read_bytes": 400, "payload.write_bytes": 250, "node.cable_length_m": 10.0},
+    )
+    answer = shown(folder, of_two_frames((70.0, 225.0)), plan)
+    assert (answer.cycle, answer.cycles, answer.frame) == (8, 12, 29)
+    assert answer.start_s == pytest.approx(0.007)
+    ends_us = [WIRE_US[0], 61.96, 64.7526, 70, 100, 152.16, 152.36, 155.1526, 225]
+    assert [event.end_us for event in answer.events] == pytest.approx(ends_us, abs=1e-3)
+    # The plan has 40 us for the host, and 4.593 us for a copy of 1300 bytes, before a frame is back.
+    late_us = [0, 0, 0, 0, 30, 0, 0, 0, 225 - 155.1526 - 44.5933]
+    assert [event.late_us for event in answer.events] == pytest.approx(late_us, abs=1e-3)
+    assert [(event.waits_for, event.label, event.frame) for event in answer.events] == [
+        ("wire", "frame 1", 29),
+        ("wire", "cables", 30),
+        ("nodes", "devices", 30),
+        ("host", "return of frame 1", 30),
+        ("host", "frame 2", 31),
+        ("wire", "frame 2", 31),
+        ("wire", "cables", 32),
+        ("nodes", "devices", 32),
+        ("host", "return of frame 2", 32),
+    ]
+    # One frame: 40 bytes, 12 of the process data and 20 of the clocks beside 1300.
+    parts = [("wire", "headers of frame 1", 72 * 0.08)]
+    parts += [("wire", f"data of device {number} of node {number}", 650 * 0.08) for number in (1, 2)]
+    ways = [f"{way} device {number}" for way, number in (("to", 1), ("to", 2), ("back from", 2), ("back from", 1))]
+    parts += [("wire", f"cable {way} of node {way[-1]}", 0.05) for way in ways]
+    parts += [("nodes", f"way {way} of node {way[-1]}", 0.698143) for way in ways]
+    parts += [("host", "master", 40.0), ("host", "copy of the data", 4.5933)]
+    planned = answer.planned_events
+    assert [(event.waits_for, event.label) for event in planned] == [part[:2] for part in parts]
+    assert [event.duration_us for event in planned] == pytest.approx([us for *_, us in parts], abs=1e-4)
+    # Devices err by 0.1233 us each way, twice that is U; both runs of frames end at a stamp in steps of 5 us.
+    doubts_us = {share.waits_for: share.uncertainty_us for share in answer.shares}
+    way_us = 2 * 2 * 2 * 0.12333
+    assert doubts_us == pytest.approx({"wire": 0, "nodes": way_us, "host": way_us + 10}, abs=1e-3)
+
+
+def test_waits_for_an_ethercat_frame_that_is_lost_are_nobodys(folder: Path) -> None:
+    plan = busplan.load_profile("ethercat-servo-8", changes={"bus.nodes": 2})
+    first, second, both = (
+        shown(folder, of_two_frames(back_us), plan, cycle=8) for back_us in ((None, 175.0), (70.0, None), (None, None))
+    )
+    # 40 bytes are copied in a seventh of a microsecond.
+    assert first.planned_events[-1].duration_us == pytest.approx(40 * 0.0035333, abs=1e-5)
+    lost = [event for event in first.events if event.waits_for == "unknown"]
+    assert [(event.label, event.frame) for event in lost] == [("return of frame 1, which is lost", 29)]
+    assert (lost[0].start_us, lost[0].end_us) == pytest.approx((WIRE_US[0], 100))
+    assert "1 frame of this cycle never came back: 29." in first.remarks
+    # Nobody knows how long the last one was waited for.
+    assert (second.recorded_us, both.recorded_us) == pytest.approx((100 + WIRE_US[1],) * 2)
+    assert "1 frame of this cycle never came back: 31." in second.remarks
+    assert "2 frames of this cycle never came back: 29, 30." in both.remarks
+    assert [event.label for event in second.events if event.waits_for == "unknown"] == []
+
+
+def test_captures_without_times_or_process_data_show_no_cycle(folder: Path) -> None:
+    machine = ethercat_recording.Machine(devices=8)
+    path = folder / "port.pcapng"
+
+    def refused(packets: list[tuple[float, bytes]]) -> str:
+        path.write_bytes(ethercat_recording.pcapng(packets))
+        with pytest.raises(BusplanError) as error:
+            busplan.timeline("ethercat-servo-8", recording=path)
+        return str(error.value).removeprefix(f"{path}: ")
+
+    steps = [(us // 1000 * 1000, content) for us, content in ethercat_recording.simulated(machine, 40)]
+    assert refused(steps) == "it shows no times: the stamps have steps of 1000 us, and frames return within 0 us"
+    machine.datagrams, machine.counters = ((14, 0, 8),), (4,)
+    words = "it has no whole cycle: no frame of process data (LRD, LWR, LRW)"
+    assert refused(ethercat_recording.simulated(machine, 40)) == words
+    with pytest.raises(BusplanError, match="channel can0: a capture of EtherCAT is of one port; only CAN logs have"):
+        busplan.timeline("ethercat-servo-8", recording=path, channel="can0")
+
+
 def test_a_slow_master_is_named(folder: Path) -> None:
     plan = busplan.load_profile("ethercat-servo-8")
     machine = ethercat_recording.Machine(devices=8, datagrams=((12, 0x10000, 160), (14, 0, 8)), host_spread_us=0.0)

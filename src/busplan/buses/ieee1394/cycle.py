@@ -246,7 +246,7 @@ class CycleWithStarts(BusCycle):
         behind_us = max(self.taking_us(group) for group in self.network.groups)
         period_us = self.network.period_us
         needed_us = min(self.required_us, period_us)
-        return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
+        return ceil((needed_us + behind_us) / period_us) if behind_us else 1
 
     def figures(self) -> Mapping[str, Number | None]:
         """Settings of the bus, latencies, gaps, and the number of nodes by equation (11)."""

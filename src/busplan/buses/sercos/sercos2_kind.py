@@ -84,7 +84,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
 
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads in whole words, up to what a drive can be told to send for each of its axes."""
-        axes = min((int(group.axes) for group in network.groups), default=1)
+        axes = min(int(group.axes) for group in network.groups)
         return PayloadRange(int(c.WORD_BYTES), int(c.MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
