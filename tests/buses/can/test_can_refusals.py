@@ -48,6 +48,8 @@ def many(number: int) -> list[dict[str, Any]]:
     return [message(name=f"m{place}", identifier=place, identifier_bits=29) for place in range(number)]
 
 
+ONE_RATE = "and a classical frame has one alone; write fd = true"
+SWITCH = "brs = false says a frame without a switch of bit rate"
 NO_SYNC = 'and bus.access = "polled" has none'
 NO_NODES = "asks for nodes, and a network of messages alone has none; remove it"
 REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
@@ -82,7 +84,11 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
         {"bus.sync_jitter_us": 4000},
         "bus.sync_jitter_us = 4000: is not under cycle.period_us, 4000: the next SYNC would come before it",
     ),
-    (ALIKE, {"cycle": None}, "cycle: missing section [cycle]; as one line, above all sections: cycle = {period_us = 4000}"),
+    (
+        ALIKE,
+        {"cycle": None},
+        "cycle: missing section [cycle]; as one line, above all sections: cycle = {period_us = 4000}",
+    ),
     (
         ALIKE,
         {"message": [message(per_node=True, sender="host")]},
@@ -96,13 +102,12 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     (
         ALIKE,
         {"message": [message(brs=False)]},
-        "message.one.brs = false: is of an FD frame that keeps the bit rate, and a classical frame has one alone; "
-        "write fd = true",
+        f"message.one.brs = false: is of an FD frame that keeps the bit rate, {ONE_RATE}",
     ),
     (
         ALIKE,
         {"message": [message(fd=True)]},
-        "message.one.fd = true: asks for bus.data_bit_rate_kbit_s; brs = false says a frame without a switch of bit rate",
+        f"message.one.fd = true: asks for bus.data_bit_rate_kbit_s; {SWITCH}",
     ),
     (
         ALIKE,
@@ -126,7 +131,11 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
         "message: has 501 entries, must have 500 or fewer beside a cycle of requests",
     ),
     *(
-        (ALIKE, {"bus.access": "polled", f"bus.{key}": value}, f"bus.{key} = {words}: asks for SYNC, {NO_SYNC}; remove it")
+        (
+            ALIKE,
+            {"bus.access": "polled", f"bus.{key}": value},
+            f"bus.{key} = {words}: asks for SYNC, {NO_SYNC}; remove it",
+        )
         for key, value, words in (
             ("sync_identifier", 0x80, "128"),
             ("sync_counter", False, "false"),
