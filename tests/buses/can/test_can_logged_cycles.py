@@ -70,7 +70,7 @@ def test_a_cycle_of_sync_is_that_by_hand(tmp_path: Path) -> None:
             log.frame(0, 0x203)
     paths = log.save(tmp_path, PLAN)
     answer = busplan.timeline(paths[0], recording=paths[1], cycle=7)
-    # Times count from the first line, at 566 us. Behind SYNC, which ends at 51 us, the fast node has 160 us, and each slow
+    # Times count from the first line, at 566 us. Behind SYNC, which ends at 51 us, the fast node has 160 us, each slow
     # one 150; behind the last feedback the host and its adapter have 150. An emergency has 8 bytes.
     assert (answer.cycles, answer.cycle, answer.frame, answer.start_s) == (11, 7, 32, (28_000 - 566) / 1e6)
     fast, slow = ("feedback of fast 1 (0x181)", "fast 1"), ("feedback of slow 1 (0x182)", "slow 1")
