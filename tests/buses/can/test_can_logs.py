@@ -403,6 +403,17 @@ def test_a_cycle_of_sync_is_that_by_hand(tmp_path: Path) -> None:
         ("frames of the plan never in the log", 0, 1, None, 135, "not shown", None, None, ""),
         ("frames of no message of the plan", 0, 0, None, 0, "within", None, None, ""),
     ]
+    keys = {one.quantity: one.key for one in answer.figures}
+    assert {
+        key for name, key in keys.items() if name.endswith("data") and name.split()[0] in ("SYNC:", "fast", "slow")
+    } == {""}
+    assert {keys[f"often: {name}"] for name in ("period", "sooner than its period", "data")} == {
+        f"message.often.{name}_{unit}" for name, unit in (("period", "us"), ("jitter", "us"), ("payload", "bytes"))
+    }
+    assert (keys["fast feedback: response"], keys["fast command: response"]) == (
+        "group.fast.execution",
+        "cycle.period_us",
+    )
     # Of the host's 1013 us 80 are its adapter's and 111 at least its command's.
     edits = {
         "bus.host_us": 822,
