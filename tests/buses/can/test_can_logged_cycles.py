@@ -106,6 +106,29 @@ def test_a_cycle_of_sync_is_that_by_hand(tmp_path: Path) -> None:
     ]
 
 
+def test_what_is_due_and_never_comes_is_said(tmp_path: Path) -> None:
+    """The slow nodes are due in every second cycle; the second of them never answers in the fifth."""
+    log = Log()
+    for cycle in range(12):
+        log.us = 4000 * (cycle + 1)
+        log.frame(0, 0x80, 0)
+        log.frame(200, 0x181)
+        for after_us, identifier in ((0, 0x182), (0, 0x183)):
+            log.frame(after_us, identifier, is_sent=cycle % 2 == 0 and (cycle, identifier) != (4, 0x183))
+        for after_us, identifier in ((600, 0x201), (0, 0x202), (0, 0x203)):
+            log.frame(after_us, identifier, is_sent=cycle % 2 == 0 or identifier == 0x201)
+    paths = log.save(tmp_path, PLAN)
+    for cycle, count, planned in ((5, 1, 7), (6, 0, 3), (7, 0, 7)):
+        answer = busplan.timeline(paths[0], recording=paths[1], cycle=cycle)
+        words = "Never came in this cycle: feedback of slow 2 (0x183)."
+        assert answer.remarks.count(words) == count == sum("Never" in remark for remark in answer.remarks)
+        # The plan beside it is that of a cycle with the same groups.
+        assert sum(one.waits_for == "wire" for one in answer.planned_events) == planned
+        # What the host waited for is not known where feedback never came.
+        waits = [(one.waits_for, one.label) for one in answer.events if one.waits_for in ("host", "unknown")]
+        assert waits == [("unknown" if count else "host", "command of fast 1 (0x201)")]
+
+
 def test_half_of_the_possible_stuff_bits_of_can_fd_is_in_doubt(tmp_path: Path) -> None:
     """8 bytes: 29 to 32 bits at 1000 kbit/s and 97 to 115 at 2000: 83.5 +/- 6 us. No byte: 33 to 35: 47.5 +/- 2 us."""
     log, data = Log(), "55" * 8
