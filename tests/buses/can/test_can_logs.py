@@ -494,3 +494,29 @@ def test_pdos_of_every_third_sync_count_the_syncs_or_the_periods(is_counted: boo
     assert found["PDOs missing"][-1] == "1 of feedback of slow 2, axis 2 (0x184)"
     assert found["PDOs twice"][1] == 0
     assert found["last PDO after SYNC"][1] == 150 + 250 + sum(frame.bits for frame in log.frames[2:10])
+
+
+def test_cycles_of_requests_at_once_begin_where_a_node_is_asked_again(tmp_path: Path) -> None:
+    """The second group is asked first, for its identifier is smaller, and a cycle leaves no pause of 90 %."""
+    log = Log()
+    for cycle in range(12):
+        log.us = 1000 * cycle
+        log.frame(0, 0x101)
+        log.frame(0, 0x201)
+        log.frame(20, 0x101, is_sent=cycle == 7)  # asked twice, too soon for another cycle
+        log.frame(20, 0x181)
+        log.frame(0, 0x281)
+    identifiers = (("first", 0x201, 0x181), ("second", 0x101, 0x281))
+    nodes = [
+        ARM["group"][0] | {"name": name, "nodes": 1, "command_identifier": command, "feedback_identifier": feedback}
+        for name, command, feedback in identifiers
+    ]
+    bus = {"kind": "can", "bit_rate_kbit_s": 1000, "access": "burst"}
+    plan = ARM | {"bus": bus, "cycle": {"period_us": 1000}, "group": nodes}
+    found = {row[0]: row[1:] for row in rows(measured(plan, log, tmp_path))}
+    assert found["cycle: period"][1:5] == (1000, ANY, 12, "within")
+    assert found["cycles without requests"][1:4] == (0, None, 12)
+    # In the twelfth cycle the log may end.
+    assert found["requests missing"][1:4] == (0, None, 22)
+    assert found["requests twice"][1:4] == (1, None, 22)
+    assert found["last answer after the first request"][1] == log.us - 11_000
