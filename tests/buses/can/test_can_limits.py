@@ -35,6 +35,13 @@ def test_the_load_has_two_more_bits_of_each_fd_frame_in_doubt() -> None:
     assert (most, words) == (0.8, "the bus load with the longest bits is 7.5%, over limits.max_load, 80.0%")
 
 
+@pytest.mark.parametrize(("load", "shortest_us"), [(0.8, 0), (0.81, inf)])
+def test_no_period_takes_load_off_messages_alone(load: float, shortest_us: float) -> None:
+    of = alone({"period_us": 135 / load, "deadline_us": "none"})
+    (found,) = (one for one in of.bus.limits if one.key == "load")
+    assert found.shortest_period_us(of, is_shown=True) == shortest_us
+
+
 def test_the_adapter_carries_so_many_frames() -> None:
     of = alone({}, {"period_us": 20_000}, max_frames_s=120)
     value, most, perhaps, words = limit(of, "adapter")

@@ -274,7 +274,7 @@ PRESS: dict[str, Any] = {
         {"name": "beats", "identifier": 0x700, "per_node": True, "payload_bytes": 1, "period_us": 8000},
         {"name": "pairs", "identifier": 0x300, "payload_bytes": 2, "period_us": 6000, "burst": 2},
         {"name": "often", "identifier": 0x302, "payload_bytes": 4, "period_us": 4000, "burst": 2, "jitter_us": 100},
-        {"name": "rare", "identifier": 0x17F, "identifier_bits": 29, "payload_bytes": 1, "period_us": 1000000},
+        {"name": "rare", "identifier": 0x180, "identifier_bits": 29, "payload_bytes": 1, "period_us": 1000000},
         {"name": "never", "identifier": 0x680, "payload_bytes": 8, "period_us": 1000000},
     ],
 }
@@ -308,7 +308,7 @@ def press() -> Log:
                 log.frame(0, 0x300, 2)
         log.us = 4000 * cycle + 3500
         log.frame(0, 0x302, 5 if cycle == 8 else 4)
-        log.frame(0, 0x17F, 1, extended=True, is_sent=cycle in (5, 6))
+        log.frame(0, 0x180, 1, extended=True, is_sent=cycle in (5, 6))
     return log
 
 
@@ -520,3 +520,16 @@ def test_cycles_of_requests_at_once_begin_where_a_node_is_asked_again(tmp_path: 
     assert found["requests missing"][1:4] == (0, None, 22)
     assert found["requests twice"][1:4] == (1, None, 22)
     assert found["last answer after the first request"][1] == log.us - 11_000
+
+
+def test_half_of_the_possible_stuff_bits_of_can_fd_is_in_doubt(tmp_path: Path) -> None:
+    """8 bytes: 29 to 32 bits at 1000 kbit/s and 97 to 115 at 2000 (ISO 11898-1), so 83.5 us, known to 6."""
+    log = Log()
+    for cycle in range(12):
+        for us, identifier in ((0, 0x141), (301, 0x241)):
+            log.lines.append(f"({(5000 + 4000 * cycle + us) / 1e6:.6f}) can0 {identifier:X}##1{'55' * 8}\n")
+    (tmp_path / "bus.log").write_text("".join(log.lines))
+    plan = busplan.load_profile("can-motors-8", changes={"bus.nodes": 1, "bus.data_bit_rate_kbit_s": 2000})
+    found = {row[0]: row[1:] for row in rows(busplan.measured(plan, tmp_path / "bus.log"))}
+    # Beside the doubt of 1 us by the stamps, and of 3 us by the space behind a frame.
+    assert found["request to answer"][1:3] == (301 - 83.5, 1 + 3 + 6)

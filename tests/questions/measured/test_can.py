@@ -292,22 +292,28 @@ def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("stamps_us", "kbit_s"),
+    ("stamps_us", "kbit_s", "surely_kbit_s"),
     [
         # The most frames that count together are 30. Each stamp is one step, 1 us, and a slow driver's 100 us wide.
-        ([1000 * number for number in range(40)], 30 * 58e3 / (30_000 + 1 + 100)),
+        ([1000 * number for number in range(40)], 30 * 58e3 / (30_000 + 1 + 100), 30 * 58e3 / 31_001),
         # Three at a time, 1 us apart: the driver read them at once, each by up to the 174 us that they take at
         # 1 Mbit/s. Of 20 frames in a row the shortest take six distances of 3 ms and two steps.
-        ([3000 * (number // 3) + number % 3 for number in range(60)], 20 * 58e3 / (18_002 + 1 + 3 * 58)),
+        (
+            [3000 * (number // 3) + number % 3 for number in range(60)],
+            20 * 58e3 / (18_002 + 1 + 3 * 58),
+            20 * 58e3 / 19_003,
+        ),
     ],
 )
 def test_the_bit_rate_that_frames_need_is_that_counted_by_hand(
-    stamps_us: list[int], kbit_s: float, tmp_path: Path
+    stamps_us: list[int], kbit_s: float, surely_kbit_s: float, tmp_path: Path
 ) -> None:
     # 58 bits: 44 + 8 and 3 of the interframe space, and 3 stuff bits.
     text = "".join(f"({us / 1e6:.6f}) can0 014#01\n" for us in stamps_us)
     needed = figure(of_log(text, tmp_path), "bit rate that")
     assert needed.recorded == pytest.approx(kbit_s, rel=1e-6)
+    # Stamps that may be 1 ms late need less; what lies between are 3.29 standard uncertainties, and U is two.
+    assert needed.uncertainty == pytest.approx((kbit_s - surely_kbit_s) * 2 / 3.29)
 
 
 def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
