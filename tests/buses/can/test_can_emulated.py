@@ -26,7 +26,7 @@ def bits_of(name: str, data: str) -> int:
 class Sent(NamedTuple):
     """A frame of a log at 1000 kbit/s: a bit is a microsecond."""
 
-    us: float
+    us: int
     """Its end, rounded down."""
     identifier: int
     bits: int
@@ -54,12 +54,11 @@ def cycles(plan: busplan.Profile, faults: Mapping[str, float | None] = MappingPr
         for line in content.decode().splitlines():
             stamp, _, frame = line.split()
             name, data = frame.split("#")
-            yield Sent(float(stamp.strip("()")) * 1e6, int(name, 16), bits_of(name, data))
+            yield Sent(round(float(stamp.strip("()")) * 1e6), int(name, 16), bits_of(name, data))
 
     of_cycle = {int(number): list(some) for number, some in groupby(sent(), key=lambda frame: (frame.us - 1) // 4000)}
     return {
-        number: [frame._replace(us=round(frame.us - 4000 * number)) for frame in some]
-        for number, some in of_cycle.items()
+        number: [frame._replace(us=frame.us - 4000 * number) for frame in some] for number, some in of_cycle.items()
     }
 
 
@@ -78,7 +77,7 @@ def test_a_cycle_of_sync_is_that_by_hand_but_where_a_fault_hits_it() -> None:
     late: dict[str, float | None] = {"late-command": 700, "jitter": 700}
     faults = {"missing-cycle": None, "missing-pdo": None, "double-pdo": None, "error-frame": None, **late}
     found = cycles(machine(pipeline_cycles=0), faults)
-    hit = (
+    hit: tuple[list[tuple[int, int]], ...] = (
         [],
         [SYNC[0], (0x182, 100), *SYNC[3:]],
         [*SYNC[:2], (0x181, 0), *SYNC[2:]],

@@ -20,7 +20,7 @@ def alone(*messages: dict[str, Any], bit_rate_kbit_s: float = 1000, **bus: Any) 
     return network_of(loaded({"schema_version": 1, "name": "alone", "bus": bus, "message": each}))
 
 
-def limit(network: Any, key: str) -> tuple[float, float, float, str]:
+def limit(network: Any, key: str) -> tuple[Any, ...]:
     """Value, the most, what of the value is only possible, and its words."""
     (found,) = (one for one in network.bus.limits if one.key == key)
     return found.value(network), found.most(network), found.perhaps(network), found.words(network)

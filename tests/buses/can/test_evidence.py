@@ -1,6 +1,6 @@
 """Published figures of CAN, each met to the last digit that its source prints."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from subprocess import CompletedProcess
 from typing import Any
@@ -9,6 +9,8 @@ import pytest
 
 import busplan
 from busplan.buses.can.evidence import FUNCTIONS
+
+ROWS: Mapping[str, Callable[..., Any]] = FUNCTIONS
 
 
 @cache
@@ -108,7 +110,7 @@ def test_a_row_has_no_stuff_bits_the_most_or_as_many_as_measured_frames_have(
     name: str, frame: dict[str, Any], least: float, most: float
 ) -> None:
     """8 bytes and 11 bits: Davis 2007, and ISO 11898-1; measured frames have 0.4 of the possible stuff bits."""
-    row = partial(FUNCTIONS[name], None, payload_bytes=8, identifier_bits=11, **frame)
+    row = partial(ROWS[name], None, payload_bytes=8, identifier_bits=11, **frame)
     found = [row(stuffing=stuffing) for stuffing in ("none", "worst", "expected")]
     assert found == pytest.approx([least, most, least + 0.4 * (most - least)])
 
@@ -116,9 +118,9 @@ def test_a_row_has_no_stuff_bits_the_most_or_as_many_as_measured_frames_have(
 def test_a_row_of_messages_has_their_load_and_responses() -> None:
     """Two messages of 8 bytes at 500 kbit/s, 270 us each; the second of 250 us leaves no response to the third."""
     sent: dict[str, Any] = {"bit_rate_kbit_s": 500, "payload_bytes": (8, 8), "period_us": (1000, 2000)}
-    assert FUNCTIONS["load"](None, **sent) == pytest.approx(0.27 + 0.135)
-    assert [FUNCTIONS["response_us"](None, message=place, **sent) for place in (1, 2)] == [540, 540]
+    assert ROWS["load"](None, **sent) == pytest.approx(0.27 + 0.135)
+    assert [ROWS["response_us"](None, message=place, **sent) for place in (1, 2)] == [540, 540]
     full = {**sent, "payload_bytes": (8, 8, 8), "period_us": (1000, 250, 9000)}
-    assert FUNCTIONS["response_us"](None, message=3, **full) is None
+    assert ROWS["response_us"](None, message=3, **full) is None
     frame: dict[str, Any] = {"payload_bytes": 8, "identifier_bits": 11, "bit_rate_kbit_s": 500, "stuffing": "worst"}
-    assert FUNCTIONS["frames_s"](None, **frame) == pytest.approx(1e6 / 270)
+    assert ROWS["frames_s"](None, **frame) == pytest.approx(1e6 / 270)
