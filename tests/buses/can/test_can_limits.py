@@ -116,3 +116,21 @@ def test_a_bus_has_127_node_ids() -> None:
     found = limit(many, "nodes")
     assert (found[0], found[1]) == (128, 127)
     assert found[3] == "128 PDOs in one direction are over the 127 node-IDs of a bus"
+
+
+def findings(of: Any) -> dict[str, str]:
+    """What the gate says of each key, without cures."""
+    found = (one.finding for one in busplan.check(of.profile).findings)
+    return {one.key: one.message.removeprefix(f"{one.key}: ").partition("; ")[0] for one in found}
+
+
+def test_the_gate_says_what_makes_a_message_late() -> None:
+    assert findings(alone({"deadline_us": 200}, {})) == {
+        "message.m0.deadline_us": "its worst-case response time is 270 us, over its 200 us"
+    }
+    # Of 135 us a frame: 1.35 % of the first, 103.85 of the second, and 1.35 of the third.
+    assert findings(alone({}, {"period_us": 130, "deadline_us": 200}, {})) == {
+        "limits.max_load": "the bus load with the longest bits is 106.5%, 80.0% allowed",
+        "message.m1.deadline_us": "it has no worst-case response time, for with it the bus has a load of 105.2%",
+        "message.m2.deadline_us": "it has no worst-case response time, for with it the bus has a load of 106.5%",
+    }
