@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import busplan
 from tests.oracles.can_log import Log
 
@@ -215,3 +217,35 @@ def test_requests_at_once_are_those_by_hand(tmp_path: Path) -> None:
     ]
     # Of three times of the host two are behind the first frame.
     assert answer.planned_us == 6 * 135 + 250 + 2 * 90
+
+
+def test_a_stamp_beyond_the_next_frame_is_late(tmp_path: Path) -> None:
+    """The first command ends before the second begins, whatever its stamp says; others may be as late, and a frame."""
+
+    def shown(late_us: int) -> busplan.RecordedTimelineAnswer:
+        log = Log()
+        for cycle in range(12):
+            log.us = 4000 * (cycle + 1)
+            for after_us, identifier in ((0, 0x80), (200, 0x181), (200 + late_us, 0x201), (-late_us, 0x202)):
+                log.frame(after_us, identifier, 0 if identifier == 0x80 else 8)
+        paths = log.save(tmp_path, PLAN | {"group": [PLAN["group"][0] | {"nodes": 2}]})
+        return busplan.timeline(paths[0], recording=paths[1], cycle=5)
+
+    in_time, late = shown(0), shown(60)
+    assert events(late) == events(in_time)
+    error = "Frames have their length at 1000 kbit/s and end with their stamps; these have an error of up to {} us."
+    assert error.format(1) in in_time.remarks
+    # The longest frame has 113 bits.
+    assert {error.format(1 + 60 + 113), "Frames come closer than the bus allows: stamps are late."} <= {*late.remarks}
+    assert not any("closer" in remark for remark in in_time.remarks)
+
+
+def test_frames_that_the_bus_of_the_plan_does_not_carry_are_refused(tmp_path: Path) -> None:
+    log = Log()
+    for _ in range(40):
+        log.frame(38, 0x181)
+    paths = log.save(tmp_path, PLAN | {"bus": PLAN["bus"] | {"bit_rate_kbit_s": 500}})
+    # 30 frames of 112 bits in 30 times 150 us, a stamp of 1 us, and 1 ms by which a driver may be late.
+    words = f"its frames need {30 * 112e3 / 5501:.0f} kbit/s, and bus.bit_rate_kbit_s = 500: they do not fit"
+    with pytest.raises(busplan.BusplanError, match=words):
+        busplan.timeline(paths[0], recording=paths[1])
