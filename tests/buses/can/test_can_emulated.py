@@ -104,6 +104,14 @@ def test_requests_one_by_one_are_those_by_hand_but_where_a_fault_hits_the_second
     assert of_each == {tuple(POLLED): CYCLES - 5 * len(hit)} | {tuple(each): 5 for each in hit}
 
 
+def test_a_node_answers_when_the_slower_of_its_two_sides_has_executed() -> None:
+    """10 us a byte, of which it sends two and gets eight."""
+    sides = {"node.execution.per_byte_us": 10, "payload.read_bytes": 2}
+    found = cycles(busplan.load_profile(machine(access="polled"), changes=sides))
+    usual = tuple((identifier, 80 if identifier > 0x200 else 180) for identifier in (0x201, 0x181, 0x202, 0x182))
+    assert {tuple(gaps(frames)) for frames in found.values()} == {usual}
+
+
 def test_requests_at_once_wait_for_the_host_alone() -> None:
     """Of requests at once the adapter is in none but the first; what it has sent does not wait for the next."""
     plan = machine(access="burst", nodes=3)

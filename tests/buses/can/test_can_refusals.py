@@ -37,9 +37,9 @@ def message(**keys: Any) -> dict[str, Any]:
     return {"name": "one", "identifier": 0x600, "payload_bytes": 8, "period_us": 10_000, **keys}
 
 
-def groups(number: int) -> dict[str, Any]:
+def groups(number: int, **keys: Any) -> dict[str, Any]:
     """Instead of nodes that are alike some groups."""
-    alike = {"nodes": 1, "axes": 1, "read_bytes": 8, "write_bytes": 8, "execution": EXECUTION}
+    alike = {"nodes": 1, "axes": 1, "read_bytes": 8, "write_bytes": 8, "execution": EXECUTION, **keys}
     some = [{"name": f"g{place}", **alike} for place in range(number)]
     return {"bus": {"kind": "can", "bit_rate_kbit_s": 500}, "payload": None, "node": None, "group": some}
 
@@ -151,6 +151,11 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
         ALIKE,
         {"bus.access": "polled", "node.queue": "single-buffer"},
         f'node.queue = "single-buffer": is computed with SYNC alone, {NO_SYNC}; remove it, and by priority is assumed',
+    ),
+    (
+        ALIKE,
+        groups(1, queue="fifo") | {"bus.access": "polled"},
+        f'group.g0.queue = "fifo": is computed with SYNC alone, {NO_SYNC}; remove it, and by priority is assumed',
     ),
     (
         ALIKE,

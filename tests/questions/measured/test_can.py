@@ -164,6 +164,7 @@ def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path:
         "not shown",
     )
     assert figure(answer, "PDOs missing").note == "299 of feedback of node 3 (0x183)"
+    assert figure(answer, "last PDO after SYNC").recorded > 0
     unplanned = figure(answer, "frames of no message")
     # 0x181 of 29 bits is not the feedback of 11.
     assert (unplanned.recorded, unplanned.note, unplanned.verdict) == (21, "0x181, 0x7fe, 0x7ff", "outside")
@@ -388,9 +389,10 @@ def test_apply_writes_the_keys_of_a_message(run: Run, tmp_path: Path) -> None:
 
 def test_steps_of_stamps_are_said(tmp_path: Path) -> None:
     logged = arbitrated(servo_8(60, seed=1))
-    coarse = [frame._replace(us=frame.us // 10 * 10) for frame in logged]
-    words = "Stamps have steps of 10 us."
-    assert [words in of_log(candump(one), tmp_path).remarks for one in (logged, coarse)] == [False, True]
+    for step_us in (2, 10):
+        coarse = [frame._replace(us=frame.us // step_us * step_us) for frame in logged]
+        words = f"Stamps have steps of {step_us} us."
+        assert [words in of_log(candump(one), tmp_path).remarks for one in (logged, coarse)] == [False, True]
     assert not any("steps of" in remark for remark in of_log(candump(logged), tmp_path).remarks)
 
 
@@ -432,6 +434,8 @@ def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:
         (500_000.0, 0x84, "3081"),
     ]
     logged = [*LOGGED, *(Logged(us, identifier, bytes.fromhex(data), False, 0) for us, identifier, data in more)]
+    # Nor is one of 29 bits.
+    logged.append(Logged(600_000.0, 0x85, bytes(8), True, 0))
     logged.sort(key=lambda frame: frame.us)
     answer = of_log(candump(logged), tmp_path)
     found, sent_us = figure(answer, "emergencies"), [us for us, *_ in more]
@@ -444,4 +448,4 @@ def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:
         f"node-ID 32: error 0x4310, register 0x80 at {times_s[3]:.6f} s, frame {places[3]}",
     ]
     assert (found.first_frame, found.worst_frame) == (places[0], places[0])
-    assert figure(answer, "frames of no message").note == "0x84"
+    assert figure(answer, "frames of no message").note == "0x84, 0x85"
