@@ -144,6 +144,8 @@ def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> Non
         ("io command", 0x303, 1),
     ]
     assert [group.name for group in figures(own).groups] == ["drives", "io"]
+    assert [doubt.key for doubt in figures(own).doubts] == ["group.execution", "bus.host_us"]
+    assert [doubt.key for doubt in figures(profile()).doubts] == ["node.execution", "bus.host_us"]
     events = busplan.timeline(own).cycle_events
     assert figures(own).required_us == sum(event.duration_us for event in events if event.term)
 
@@ -196,6 +198,15 @@ def test_responses_are_those_by_hand_and_their_parts_add_up() -> None:
     parts = ("jitter", "blocking", "interference", "backlog", "frame", "execution", "pipeline", "sync_wait")
     for answer in answers.values():
         assert answer["worst_response_us"] == sum(answer[f"{key}_us"] or 0.0 for key in parts)
+
+
+@pytest.mark.parametrize(("identifier", "before"), [(0x80, 0), (0x190, 3), (0x210, 6), (0x2A0, 9)])
+def test_sync_waits_for_pdos_of_smaller_identifiers(identifier: int, before: int) -> None:
+    """Three nodes with feedback from 0x181 on, commands from 0x201 on, and the second feedback from 0x281 on."""
+    late = {"message__alarm__identifier": 0x600, "message__alarm__jitter_us": 0.0, "cycle__period_us": 20_000.0}
+    frames = [135 * BIT_US] * 3 + [115 * BIT_US] * 3 + [75 * BIT_US] * 3
+    found = responses(profile(bus__sync_identifier=identifier, **late))["SYNC"]
+    assert found == 75 * BIT_US + sum(frames[:before]) + 55 * BIT_US
 
 
 @given(st.data())

@@ -103,6 +103,34 @@ def test_what_was_held_up_in_a_queue_comes_twice_in_short_time() -> None:
     assert responses(network(*sent, queue="priority"))["m"] == 3 * 135
 
 
+@pytest.mark.parametrize(("queue", "period_us"), [("priority", 866), ("fifo", 1136)])
+def test_late_pdos_of_a_queue_come_as_late_as_the_cycle_ends(queue: str, period_us: int) -> None:
+    """A cycle takes 730 us: SYNC of 55, two PDOs of 135, the host's message, and two frames of another that may block.
+
+    Late PDOs come 460 us behind SYNC, or out of a queue behind the message as late as the cycle ends. They and the
+    message take 405 us and a bit of 1 us, and then the next PDOs may come.
+    """
+    execution = {"kind": "linear", "grade": "measured", "base_us": 0, "per_byte_us": 0, "uncertainty_us": 0}
+    sent = {"payload_bytes": 8, "period_us": 100_000}
+    own = loaded(
+        {
+            "schema_version": 1,
+            "name": "line",
+            "bus": {"kind": "can", "bit_rate_kbit_s": 1000, "nodes": 1, "queue": queue},
+            "cycle": {"period_us": period_us},
+            "payload": {"read_bytes": 8, "write_bytes": 8},
+            "node": {"axes": 1, "execution": execution},
+            "message": [
+                {"name": "first", "identifier": 0x10, "sender": "host", **sent},
+                {"name": "last", "identifier": 0x600, "sender": "other", **sent},
+            ],
+        }
+    )
+    assert figures(own).required_us == 730
+    sooner = busplan.load_profile(own, changes={"cycle.period_us": period_us - 1})
+    assert (responses(own)["last"], responses(sooner)["last"]) == (595, 595 + 2 * 135)
+
+
 @pytest.mark.parametrize("order", ["fifo", "single-buffer"])
 def test_a_deadline_missed_by_the_bound_alone_is_not_shown(order: str) -> None:
     sent = ({"sender": "a", "deadline_us": 500}, {"sender": "b"}, {"sender": "b"}, {"sender": "a"}, {"sender": "b"})

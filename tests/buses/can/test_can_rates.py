@@ -1,13 +1,14 @@
 """PDOs with every n-th SYNC: the fullest cycle decides, the load is that of the mean cycle."""
 
 from collections.abc import Callable
-from math import lcm
+from math import inf, lcm
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import busplan
+from busplan.questions.fit.network import network_of
 from tests.buses.can.machines import WORST, figures, loaded, responses, text_of
 
 
@@ -122,9 +123,41 @@ def test_no_cycle_lasts_longer_than_the_fullest() -> None:
 
 def test_a_cycle_of_sync_alone_waits_for_a_single_frame() -> None:
     low = tuple(message(f"low{number}", 0x7F0 + number) for number in range(3))
-    own = machine(group("io", 2, size=8, every=2), messages=low)
-    assert busplan.timeline(own, cycle=1).used_us == 55 + 2 * 48 + 4 * 135 + 3 * 135
+    own = machine(group("io", 2, size=8, every=2), messages=low, pipeline_cycles=0, host_us=20, host_write_us=30)
+    assert busplan.timeline(own, cycle=1).used_us == 55 + 2 * 48 + 4 * 135 + 3 * 135 + 20 + 30
+    # Without feedback neither the host nor its adapter has anything to do.
     assert busplan.timeline(own, cycle=2).used_us == 55 + 135
+
+
+def beside_one_node(period_us: float, *, every: int, deadline_us: float = 1e5) -> busplan.Profile:
+    """A node without execution time, and messages before and behind its PDOs; each frame takes 135 us, SYNC 55."""
+    execution = {"kind": "linear", "grade": "measured", "base_us": 0, "per_byte_us": 0, "uncertainty_us": 0}
+    one = group("io", 1, axes=0, every=every) | {"execution": execution}
+    messages = message("first", 0x10), message("last", 0x600, deadline_us=deadline_us)
+    return busplan.load_profile(machine(one, messages=messages), changes={"cycle.period_us": period_us})
+
+
+@pytest.mark.parametrize(("every", "period_us", "rounds"), [(1, 865, 2), (1, 866, 1), (2, 865, 1)])
+def test_a_message_meets_late_pdos_again_when_they_are_due(every: int, period_us: float, rounds: int) -> None:
+    """A cycle takes 730 us: SYNC, two PDOs, the first message, and two frames of the last one, which may block.
+
+    Late feedback and commands come 460 us behind SYNC. They and the first message take 405 us and a bit, and the next
+    SYNC comes with the next PDOs from 866 - 460 on.
+    """
+    assert figures(beside_one_node(866, every=1)).required_us == 55 + 2 * 135 + 135 + 2 * 135
+    alone_us = 55 + 4 * 135
+    assert responses(beside_one_node(period_us, every=every))["last"] == alone_us + (rounds - 1) * 2 * 135
+
+
+def test_the_smallest_period_keeps_a_deadline() -> None:
+    """One frame of the last message blocks then: late PDOs come 325 us behind SYNC, and 406 us later it has gone."""
+    network = network_of(beside_one_node(500, every=1, deadline_us=595))
+    (limit,) = (one for one in network.bus.limits if one.key == "deadline")
+    assert limit.shown.shortest_period_us(network) == pytest.approx(325 + 406, rel=1e-9)
+    for period_us, is_late in ((730.9, True), (731.0, False)):
+        assert limit.shown.is_broken(network._replace(period_us=period_us)) == is_late
+    never = network_of(beside_one_node(500, every=1, deadline_us=594))
+    assert limit.shown.shortest_period_us(never) == inf
 
 
 def test_a_loop_waits_for_the_cycle_in_which_its_commands_are_due() -> None:

@@ -240,6 +240,32 @@ def test_a_cycle_is_the_sum_of_its_parts(way: str) -> None:
     assert (parts["command"], parts["feedback"], parts["host"], parts["wait"]) == (1080, 1080, 160, waits_us)
 
 
+@pytest.mark.parametrize(
+    ("way", "period_us", "frames"), [("polled", 896, 1), ("polled", 895, 2), ("burst", 796, 1), ("burst", 795, 2)]
+)
+def test_a_message_that_goes_first_comes_as_often_as_the_cycle_lets_it(way: str, period_us: int, frames: int) -> None:
+    """Two motors: four frames of 135 us, 10 us of the host for each, 100 us of each, or of both; and a bit of 1 us."""
+    first = Message(0x10, 8, period_us)
+    own = loaded(Arm(2, way, exec_us=100, host_us=10, messages=(first,)).data(10_000))
+    assert terms(own)["interference"] == frames * 135
+    assert sum(terms(own).values()) == (760 if way == "polled" else 660) + frames * 135
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_message_that_goes_last_waits_for_one_cycle_where_the_next_is_far(way: str) -> None:
+    own = loaded(Arm(2, way, exec_us=100, host_us=10, messages=(Message(0x700, 8, 100_000),)).data(10_000))
+    assert responses(own)["m0"] == 5 * 135
+
+
+@pytest.mark.parametrize(("access", "most"), [("sync", ", 80 allowed"), ("polled", "")])
+def test_a_load_has_a_limit_beside_it_where_the_plan_has_one(access: str, most: str) -> None:
+    # 16 frames of 135 us, and SYNC of 55.
+    data = Arm(8, "polled").data(10_000 if access == "sync" else 2000, access=access)
+    said = " ".join(str(busplan.capacity(loaded(data))).split())
+    assert f"load {22.1 if access == 'sync' else 108} %{most} " in said
+    assert ("the bus load with the longest bits is 108.0%, over that of a bus" in said) == (access == "polled")
+
+
 @pytest.mark.parametrize(("way", "number"), [("polled", 6), ("burst", 2)])
 def test_so_many_frames_of_a_lower_priority_block(way: str, number: int) -> None:
     lower = Message(0x700, 8, 200)

@@ -1,11 +1,16 @@
 """Published figures of CAN, each met to the last digit that its source prints."""
 
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from subprocess import CompletedProcess
 from typing import Any
 
+import pytest
+
 import busplan
+from busplan.buses.can.evidence import FUNCTIONS
+
+ROWS: Mapping[str, Callable[..., Any]] = FUNCTIONS
 
 
 @cache
@@ -90,3 +95,32 @@ def test_a_verdict_says_what_nobody_has_tested(run: Callable[..., CompletedProce
     assert f"{words}; never measured: the cycle" in " ".join(run("evidence", "can").stdout.split())
     assert f", {words}\n" in run("capacity", "can-servo-8", "--all").stdout
     assert "\n  never measured  the cycle\n" in run("capacity", "can-servo-8").stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "frame", "least", "most"),
+    [
+        ("frame_bits", {}, 111, 135),
+        ("fd_frame_bits", {}, 29 + 97, 32 + 115),
+        ("frame_us", {"bit_rate_kbit_s": 500}, 222, 270),
+        ("frame_us", {"bit_rate_kbit_s": 500, "data_bit_rate_kbit_s": 2000}, 29 * 2 + 97 / 2, 32 * 2 + 115 / 2),
+    ],
+)
+def test_a_row_has_no_stuff_bits_the_most_or_as_many_as_measured_frames_have(
+    name: str, frame: dict[str, Any], least: float, most: float
+) -> None:
+    """8 bytes and 11 bits: Davis 2007, and ISO 11898-1; measured frames have 0.4 of the possible stuff bits."""
+    row = partial(ROWS[name], None, payload_bytes=8, identifier_bits=11, **frame)
+    found = [row(stuffing=stuffing) for stuffing in ("none", "worst", "expected")]
+    assert found == pytest.approx([least, most, least + 0.4 * (most - least)])
+
+
+def test_a_row_of_messages_has_their_load_and_responses() -> None:
+    """Two messages of 8 bytes at 500 kbit/s, 270 us each; the second of 250 us leaves no response to the third."""
+    sent: dict[str, Any] = {"bit_rate_kbit_s": 500, "payload_bytes": (8, 8), "period_us": (1000, 2000)}
+    assert ROWS["load"](None, **sent) == pytest.approx(0.27 + 0.135)
+    assert [ROWS["response_us"](None, message=place, **sent) for place in (1, 2)] == [540, 540]
+    full = {**sent, "payload_bytes": (8, 8, 8), "period_us": (1000, 250, 9000)}
+    assert ROWS["response_us"](None, message=3, **full) is None
+    frame: dict[str, Any] = {"payload_bytes": 8, "identifier_bits": 11, "bit_rate_kbit_s": 500, "stuffing": "worst"}
+    assert ROWS["frames_s"](None, **frame) == pytest.approx(1e6 / 270)

@@ -225,6 +225,12 @@ def test_a_frame_is_repeated_from_its_last_bit_on(burst: int) -> None:
     assert responses_us(own) == [270 + 110 + burst * (62 + 110), *[us + burst * (62 + 270) for us in (490, 490)]]
 
 
+def test_an_error_counts_until_the_frame_itself_has_gone() -> None:
+    # A frame and its error take 602 us. An error that comes sooner hits it again.
+    once, twice = (network({"period_us": 100_000}, error_period_us=us) for us in (602, 601))
+    assert (responses_us(once), responses_us(twice)) == ([332 + 270], [2 * 332 + 270])
+
+
 def test_an_error_in_each_frame_leaves_no_response_time() -> None:
     assert responses_us(network({"period_us": 1000}, error_period_us=332)) == [None]
     assert responses_us(network({"period_us": 10_000}, error_period_us=500)) != [None]

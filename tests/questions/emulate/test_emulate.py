@@ -260,6 +260,7 @@ deadline_us = "none"
     ("queue", "sender", "least", "most"),
     [
         ("priority", "host", 0, 1),
+        ("priority", "other", 0, 1),
         ("fifo", "host", 8, 11),
         ("single-buffer", "host", 0, 1),
         ("single-buffer", "other", 5, 11),

@@ -164,6 +164,7 @@ def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path:
         "not shown",
     )
     assert figure(answer, "PDOs missing").note == "299 of feedback of node 3 (0x183)"
+    assert figure(answer, "last PDO after SYNC").recorded > 0
     unplanned = figure(answer, "frames of no message")
     # 0x181 of 29 bits is not the feedback of 11.
     assert (unplanned.recorded, unplanned.note, unplanned.verdict) == (21, "0x181, 0x7fe, 0x7ff", "outside")
@@ -292,22 +293,28 @@ def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("stamps_us", "kbit_s"),
+    ("stamps_us", "kbit_s", "surely_kbit_s"),
     [
         # The most frames that count together are 30. Each stamp is one step, 1 us, and a slow driver's 100 us wide.
-        ([1000 * number for number in range(40)], 30 * 58e3 / (30_000 + 1 + 100)),
+        ([1000 * number for number in range(40)], 30 * 58e3 / (30_000 + 1 + 100), 30 * 58e3 / 31_001),
         # Three at a time, 1 us apart: the driver read them at once, each by up to the 174 us that they take at
         # 1 Mbit/s. Of 20 frames in a row the shortest take six distances of 3 ms and two steps.
-        ([3000 * (number // 3) + number % 3 for number in range(60)], 20 * 58e3 / (18_002 + 1 + 3 * 58)),
+        (
+            [3000 * (number // 3) + number % 3 for number in range(60)],
+            20 * 58e3 / (18_002 + 1 + 3 * 58),
+            20 * 58e3 / 19_003,
+        ),
     ],
 )
 def test_the_bit_rate_that_frames_need_is_that_counted_by_hand(
-    stamps_us: list[int], kbit_s: float, tmp_path: Path
+    stamps_us: list[int], kbit_s: float, surely_kbit_s: float, tmp_path: Path
 ) -> None:
     # 58 bits: 44 + 8 and 3 of the interframe space, and 3 stuff bits.
     text = "".join(f"({us / 1e6:.6f}) can0 014#01\n" for us in stamps_us)
     needed = figure(of_log(text, tmp_path), "bit rate that")
     assert needed.recorded == pytest.approx(kbit_s, rel=1e-6)
+    # Stamps that may be 1 ms late need less; what lies between are 3.29 standard uncertainties, and U is two.
+    assert needed.uncertainty == pytest.approx((kbit_s - surely_kbit_s) * 2 / 3.29)
 
 
 def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
@@ -382,9 +389,10 @@ def test_apply_writes_the_keys_of_a_message(run: Run, tmp_path: Path) -> None:
 
 def test_steps_of_stamps_are_said(tmp_path: Path) -> None:
     logged = arbitrated(servo_8(60, seed=1))
-    coarse = [frame._replace(us=frame.us // 10 * 10) for frame in logged]
-    words = "Stamps have steps of 10 us."
-    assert [words in of_log(candump(one), tmp_path).remarks for one in (logged, coarse)] == [False, True]
+    for step_us in (2, 10):
+        coarse = [frame._replace(us=frame.us // step_us * step_us) for frame in logged]
+        words = f"Stamps have steps of {step_us} us."
+        assert [words in of_log(candump(one), tmp_path).remarks for one in (logged, coarse)] == [False, True]
     assert not any("steps of" in remark for remark in of_log(candump(logged), tmp_path).remarks)
 
 
@@ -426,6 +434,8 @@ def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:
         (500_000.0, 0x84, "3081"),
     ]
     logged = [*LOGGED, *(Logged(us, identifier, bytes.fromhex(data), False, 0) for us, identifier, data in more)]
+    # Nor is one of 29 bits.
+    logged.append(Logged(600_000.0, 0x85, bytes(8), True, 0))
     logged.sort(key=lambda frame: frame.us)
     answer = of_log(candump(logged), tmp_path)
     found, sent_us = figure(answer, "emergencies"), [us for us, *_ in more]
@@ -438,4 +448,4 @@ def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:
         f"node-ID 32: error 0x4310, register 0x80 at {times_s[3]:.6f} s, frame {places[3]}",
     ]
     assert (found.first_frame, found.worst_frame) == (places[0], places[0])
-    assert figure(answer, "frames of no message").note == "0x84"
+    assert figure(answer, "frames of no message").note == "0x84, 0x85"

@@ -16,7 +16,7 @@ Stuffing = Literal["worst", "expected", "none"]
 
 def stuffed(_cycle: object, *, least: float, most: float, stuffing: Stuffing) -> float:
     """A figure between that without stuff bits and that with the most."""
-    shares: Mapping[Stuffing, float] = {"worst": 1, "expected": float(c.EXPECTED_STUFFING), "none": 0}
+    shares: Mapping[Stuffing, float] = {"expected": float(c.EXPECTED_STUFFING), "none": 0}
     return most if stuffing == "worst" else least + shares[stuffing] * (most - least)
 
 

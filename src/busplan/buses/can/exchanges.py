@@ -126,8 +126,6 @@ class RequestLog:
         """Requests of a node with their answers: two behind one request, where one before had none, are late."""
         last = self._places(node.requests[-1])
         firsts, begins, ends = (self._places(way) for way in (node.requests[0], node.answers[0], node.answers[-1]))
-        if not len(last):
-            return _Exchanges(last, last, last, last, np.zeros(0), np.zeros(0, dtype=np.bool_), 0, last, last)
         at = np.searchsorted(firsts, last, side="right") - 1
         first = np.where(at >= 0, firsts[np.maximum(at, 0)], last) if len(firsts) else last
         answered = due_pdos(self.times_us[last], self.times_us[ends], every=1)

@@ -126,8 +126,6 @@ def numbered(parts_us: Mapping[str, Number], source: str = "", **figures: Number
 def _last_in_queue(traffic: Traffic, place: int) -> Stream | None:
     """Stream of the lowest priority in the queue of a response; None where the queue is by priority."""
     answered, _ = worst_cases(traffic)[place]
-    if answered.queue_place is None:
-        return None
     return next((stream for stream in streams(traffic) if stream.last_place == answered.queue_place), None)
 
 
