@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from busplan.errors import BusplanError
+from busplan.files import given_path
 from busplan.profile.document import read_bytes
 from busplan.profile.machine_files import FORMATS, UTF_16, Format, matching, root_tag, text_of
 from busplan.progress import Progress
@@ -32,7 +33,7 @@ def read_machine(
     is of no known format or of two, or is not valid raises BusplanError, with its place.
     """
     name = "<stdin>" if argument == "-" else argument
-    content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
+    content = read_bytes(given_path(argument), name=name, limit=MOST_BYTES)
     machine_format = recognised(content, name=name)
     read = import_module(f"busplan.questions.import_.{machine_format.module}").read
     reading: Reading
