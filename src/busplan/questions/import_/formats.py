@@ -8,7 +8,7 @@ from typing import Final
 from busplan.errors import BusplanError
 from busplan.files import given_path
 from busplan.profile.document import read_bytes
-from busplan.profile.machine_files import FORMATS, UTF_16, Format, matching, root_tag, text_of
+from busplan.profile.machine_files import FORMATS, UTF_16, Format, matching, recordings, root_tag, text_of
 from busplan.progress import Progress
 from busplan.questions.import_.reading import Reading
 
@@ -58,9 +58,10 @@ def recognised(content: bytes, *, name: str) -> Format:
 
     A file of no known format, of two, or an empty or too large one raises BusplanError.
     """
-    formats = matching(content)
-    if len(content) > MOST_BYTES and not any(each.head for each in formats):
+    formats = recordings(content)
+    if not formats and len(content) > MOST_BYTES:
         raise BusplanError(f"{name}: is larger than {MOST_BYTES:,} bytes; no file of one machine is")
+    formats = formats or matching(content)
     if len(formats) > 1:
         titles = " and ".join(each.title for each in formats)
         raise BusplanError(f"{name}: has lines of {titles}; give a file for each")

@@ -9,6 +9,8 @@ from busplan.errors import BusplanError
 
 _MOST_DEPTH: Final = 64
 _MOST_ELEMENTS: Final = 1_000_000
+_MOST_TAG_BYTES: Final = 1_000_000
+_PIECE_BYTES: Final = 100_000
 _FAR: Final = 300
 """Columns that a person counts, at most; some tools write all in one line."""
 
@@ -22,7 +24,7 @@ class Element:
     line: int | str
     """Line of the element, with the column if the line is long."""
     attributes: dict[str, str]
-    children: list["Element"] = field(default_factory=list)
+    children: Sequence["Element"] = ()
     text: str = ""
     """Text after the last child."""
 
@@ -66,7 +68,12 @@ class _Reader:
     def read(self, content: bytes) -> None:
         """Read the file."""
         try:
-            self.parser.Parse(content, True)
+            for start in range(0, len(content), _PIECE_BYTES):
+                self.parser.Parse(content[start : start + _PIECE_BYTES], False)
+                # The text between two tags comes in pieces, a tag or comment as a whole.
+                if start - self.parser.CurrentByteIndex > _MOST_TAG_BYTES:
+                    raise self._refuse(f"a tag of over {_MOST_TAG_BYTES:,} bytes; no such file is a machine's")
+            self.parser.Parse(b"", True)
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
             raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
