@@ -9,6 +9,8 @@ from busplan.errors import BusplanError
 
 _MOST_DEPTH: Final = 64
 _MOST_ELEMENTS: Final = 1_000_000
+_MOST_KEPT: Final = 500_000
+"""Most elements that are not left out: they bound the memory."""
 _MOST_TAG_BYTES: Final = 1_000_000
 _PIECE_BYTES: Final = 100_000
 _FAR: Final = 300
@@ -24,7 +26,7 @@ class Element:
     line: int | str
     """Line of the element, with the column if the line is long."""
     attributes: dict[str, str]
-    children: Sequence["Element"] = ()
+    children: list["Element"] = field(default_factory=list)
     text: str = ""
     """Text after the last child."""
 
@@ -57,7 +59,7 @@ class _Reader:
         self.root = Element("", 0, {})
         self.open = [self.root]
         self.texts: list[str] = []
-        self.depth = self.elements = self.skips = 0
+        self.depth = self.elements = self.kept = self.skips = 0
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self._doctype
@@ -97,6 +99,9 @@ class _Reader:
         if self.skips or tag in self.skipped:
             self.skips += 1
             return
+        self.kept += 1
+        if self.kept > _MOST_KEPT:
+            raise self._refuse(f"more than {_MOST_KEPT:,} elements to read; no such file is a machine's")
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber
         element = Element(tag, f"{line}:{column + 1}" if column > _FAR else line, attributes)
         self.open[-1].children.append(element)
