@@ -38,9 +38,7 @@ _REST: Final = r"(?:[^\";]++|\"(?:[^\"\\]++|\\.)*+(?:\"|\Z))*+(?:;|\Z)"
 _SIGNALS: Final = re.compile(
     rf"^[ \t]*(?:SG_ [^\n]*$|(?:VAL_|SIG_VALTYPE_|SG_MUL_VAL_) {_REST})", re.MULTILINE | re.DOTALL
 )
-_ATTRIBUTE: Final = re.compile(
-    rf"^[ \t]*BA_(?:DEF_DEF_)? +\"([^\"\n]*)\"{_REST}", re.MULTILINE | re.DOTALL
-)
+_ATTRIBUTE: Final = re.compile(rf"^[ \t]*BA_(?:DEF_DEF_)? +\"([^\"\n]*)\"{_REST}", re.MULTILINE | re.DOTALL)
 _DEFINED: Final = re.compile(r"^[ \t]*BA_DEF_(?:REL_)? +(?:\w+_ +)?\"([^\"\n]*)\"", re.MULTILINE)
 _NUMBERED: Final = re.compile(r"\b(BO_|SG_|BO_TX_BU_|SIG_GROUP_) +(\d{4,9})\b")
 """Number of a message where it has 4 to 9 digits: it lacks bit 31, which makes it 10."""
@@ -195,7 +193,9 @@ def _of_one_bus(database: Any, machine: Reading, bus: str | None) -> list[Any]:
             1, f"messages of {len(buses)} buses, {names}: a profile describes one bus; --bus NAME reads one"
         )
     if bus is not None and bus not in buses:
-        raise machine.refusal(1, f"bus {bus}: no messages of such a bus; there are {first_of(buses, _LISTED) or 'none'}")
+        raise machine.refusal(
+            1, f"bus {bus}: no messages of such a bus; there are {first_of(buses, _LISTED) or 'none'}"
+        )
     return [message for message in database.messages if bus is None or message.bus_name == bus]
 
 
