@@ -109,7 +109,7 @@ def test_what_is_no_time_is_refused_with_an_example(refused: Refused, text: str)
 def test_a_wrong_value_is_named_with_its_option(refused: Refused, arguments: tuple[str, ...], said: str) -> None:
     command, *options = arguments
     message = refused(command, "paper-4ms", *options)
-    assert message.startswith(said)
+    assert message.startswith(said[:400])
     assert "\n" not in message
 
 
