@@ -57,6 +57,7 @@ REFUSED = {
     "no masters": ("<masters/>", ":1: 0 masters"),
     "half a root": ("<EtherCATConfig><Config>", r":1:\d+: not valid XML: no element found"),
     "no table": ("BO_ 99 Door\n", ":2:1: not a valid DBC: invalid syntax"),
+    "a statement cut off": ("BO_ 1 A: 8 X\n\nVAL_ 1 a\n\nBO_ 2 B: 8 X\n", r":\d+:\d+: not a valid DBC"),
     "an identifier twice": (
         "BO_ 256 A: 8 X\nBO_ 256 B: 8 X\n",
         ":2: message B has the identifier of A: a bus has",
@@ -140,7 +141,7 @@ def test_no_line_takes_long(case: str, tmp_path: Path) -> None:
     start_s = time.process_time()
     with pytest.raises(busplan.BusplanError):
         busplan.import_profile(tmp_path / "machine.in")
-    assert time.process_time() - start_s < 60  # on an idle machine less than one
+    assert time.process_time() - start_s < 15  # on an idle machine less than one
 
 
 def test_a_file_of_100_megabytes_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
