@@ -16,6 +16,16 @@ _NEW_MODE: Final = 0o666
 """Permissions of a new file, before the umask."""
 
 
+EMPTY_PATH: Final = "the path is empty; give the name of a file"
+
+
+def given_path(path: str | os.PathLike[str]) -> Path:
+    """A path that a person gives. pathlib takes an empty one for the working folder; here it raises BusplanError."""
+    if not os.fspath(path):
+        raise BusplanError(f"'': {EMPTY_PATH}")
+    return Path(path)
+
+
 def document_bytes(document: str | bytes) -> bytes:
     """UTF-8 of a document; bytes of a path that are not UTF-8 become JSON escapes."""
     return document.encode("utf-8", "backslashreplace") if isinstance(document, str) else document

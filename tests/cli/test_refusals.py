@@ -91,6 +91,9 @@ def test_what_is_no_file_is_refused(refused: Refused, tmp_path: Path) -> None:
     said = refused("capacity", "missing.toml", cwd=tmp_path)
     assert said.startswith("missing.toml: no such file, and no shipped profile")
     assert refused("capacity", ".", cwd=tmp_path) == ".: is a directory; give a file"
+    said = refused("explain", "paper-4ms", "x" * 10_000)
+    assert len(said) < 1100
+    assert said.endswith("x: no such figure; without one, explain --all lists them")
 
 
 def test_an_empty_file_is_told_what_a_profile_needs(refused: Refused, tmp_path: Path) -> None:

@@ -168,7 +168,7 @@ def test_pipes_and_folders_called_like_profiles_are_skipped(collect: Collect) ->
     ("argument", "words"),
     [
         ("gone.toml", "gone.toml: no such file"),
-        ("", "'': no such file"),
+        ("", "'': the path is empty"),
         ("a\0b", "no such file"),
         ("x" * 5000, "no such file"),
         ("empty", "empty: no profile below this folder"),

@@ -179,7 +179,11 @@ def test_very_many_problems_are_counted() -> None:
     assert (len(problems), problems[-1]) == (51, "m.csv: and 20 more problems")
 
 
-def test_no_text_and_too_much_of_it() -> None:
+def test_no_text_and_too_much_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("busplan.profile.measurements._MOST_ROWS", 3)
+    assert refusals("payload_bytes,latency_us\n" + "4,40\n" * 4) == [
+        "m.csv:5:1: more than 3 measurements; give fewer repetitions"
+    ]
     assert refusals(b"payload_bytes,latency_us\n4,\xff\n")[0].startswith("m.csv:2:3: not a text file: byte 0xff")
     assert refusals(b"#" * 20_000_001)[0].startswith("m.csv:1:1: the file is larger than 20,000,000 bytes")
 

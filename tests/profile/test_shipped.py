@@ -160,7 +160,7 @@ def test_what_is_neither_is_refused_with_the_shipped_names(argument: str) -> Non
 
 @pytest.mark.usefixtures("work")
 def test_an_empty_path_is_refused() -> None:
-    with pytest.raises(BusplanError, match=r"\A'': no such file, and no shipped profile of that name; "):
+    with pytest.raises(BusplanError, match=r"\A'': the path is empty; give the name of a file\Z"):
         load("")
 
 

@@ -29,6 +29,7 @@ from busplan.cli.options import (
     form_of_file,
     form_typed,
     format_option,
+    path_typed,
     time_us,
 )
 from busplan.cli.output import PAGER, PlanFailsError, say
@@ -226,6 +227,10 @@ def _parameters(function: Command) -> tuple[bool, dict[str, tuple[type, list[str
                 own.append(field)
         else:
             own.append(each)
+    for each in own:
+        annotation, info = get_args(each.annotation)
+        if Path in (annotation, *get_args(annotation)) and info.parser is None:
+            info.parser = path_typed
     return takes, records, [each.replace(kind=Parameter.KEYWORD_ONLY) for each in own]
 
 

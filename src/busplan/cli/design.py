@@ -33,7 +33,7 @@ from busplan.cli.output import PlanFailsError, message_width, progress_bar, say,
 from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.english import printable
 from busplan.errors import BusplanError
-from busplan.files import NewFile, new_file
+from busplan.files import NewFile, given_path, new_file
 from busplan.forms import ENDINGS, Form, ending_expected
 from busplan.profile.changes import KeyChange, KeyChanges, require_separate
 
@@ -313,7 +313,7 @@ def _measurements_file(argument: str) -> Iterator[Path]:
 
 @command(
     "For a machine that was recorded with another value: --apply does not write it.",
-    reads=lambda recording, **_: () if recording is None else (Path(recording),),
+    reads=lambda recording, **_: () if recording is None else (given_path(recording),),
 )
 def measured_command(
     call: Call,
@@ -641,7 +641,7 @@ def import_command(
     new = None if output == STANDARD_OUTPUT else output
     if new is not None and new.suffix.lower() != ".toml":
         raise BusplanError(f"--output {new}: expected a name ending in .toml: it is a profile")
-    inputs = [Path(path) for path in paths]
+    inputs = [given_path(path) for path in paths]
     require_apart({"--output": new}, inputs=inputs, of_profiles=True)
     with ExitStack() as files:
         # Opened before the work, so that a path that cannot be written fails at once.

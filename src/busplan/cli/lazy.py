@@ -29,6 +29,7 @@ _WRONG: Final = MappingProxyType(
         "float_parsing": "expected a number",
         "greater_than_equal": "must be {ge:,} or more",
         "less_than_equal": "must be {le:,} or less",
+        "value_error": "{error}",
     }
 )
 """What is said of a value that typer refuses, by pydantic's type of error."""
@@ -53,7 +54,7 @@ def _in_words(error: Any) -> str:
             right += f", in {unit[1]}" if unit and refused["type"].endswith("_parsing") else ""
         is_of_environment = error.ctx.get_parameter_source(param.name).name == "ENVIRONMENT"
         typed = f"{param.envvar}=" if is_of_environment else f"{max(param.opts, key=len)} "
-        return f"{typed}{refused['input']}: {right}; {hint}"
+        return f"{typed}{refused['input'] or repr('')}: {right}; {hint}"
     if hasattr(error, "possibilities") and any("--set" in param.opts for param in error.cmd.params):
         # The beginning of an option of the command is more likely meant as that option.
         is_begun = any(option.startswith(f"{error.option_name}-") for option in error.possibilities or ())

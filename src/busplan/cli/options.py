@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 import typer
 
 from busplan.errors import BusplanError
+from busplan.files import EMPTY_PATH
 from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
 from busplan.profile.changes import in_unit
 
@@ -107,7 +108,14 @@ def output_option(words: str) -> Any:
 
 
 def _file_unless_dash(text: str) -> Path | None:
-    return None if text == "-" else Path(text)
+    return None if text == "-" else path_typed(text)
+
+
+def path_typed(text: str) -> Path:
+    """Value of an option that is a path; typer names the option of one that is refused."""
+    if not text:
+        raise ValueError(EMPTY_PATH)
+    return Path(text)
 
 
 def format_option(default: str, *, more: str = "") -> Any:

@@ -140,14 +140,26 @@ class PlanFailsError(Exception):
 
 
 def say(*messages: str) -> None:
-    """Write messages to stderr, one on each line; a closed stderr is ignored."""
+    """Write messages to stderr, one on each line, without the middle of a very long one; a closed stderr is ignored."""
     from busplan.english import printable  # loaded only if there is a message
 
     with suppress(OSError):
         for message in messages:
             # Names and arguments may contain control characters.
-            for line in _fitting(printable(message)):
+            for line in _fitting(printable(_shortened(message))):
                 print(line, file=sys.stderr, flush=True)  # noqa: T201 - the only place that prints
+
+
+_LONGEST_MESSAGE: Final = 2000
+_END_OF_MESSAGE: Final = 500
+"""Characters of a very long message that are shown of its beginning and of its end, which says what would be right."""
+
+
+def _shortened(message: str) -> str:
+    if len(message) <= _LONGEST_MESSAGE:
+        return message
+    left_out = len(message) - 2 * _END_OF_MESSAGE
+    return f"{message[:_END_OF_MESSAGE]} ... ({left_out:,} characters) ... {message[-_END_OF_MESSAGE:]}"
 
 
 def _fitting(message: str) -> list[str]:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from busplan.errors import BusplanError
+from busplan.files import given_path
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.gate.baseline import Baseline, load_baseline
@@ -198,7 +199,7 @@ def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool)
 
 
 def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Baseline:
-    recorded = baseline if isinstance(baseline, Baseline) else load_baseline(Path(baseline))
+    recorded = baseline if isinstance(baseline, Baseline) else load_baseline(given_path(baseline))
     if not recorded.is_current:
         raise BusplanError(
             f"{recorded}: recorded by other timing models, so its figures cannot be compared; record it again with "

@@ -196,7 +196,7 @@ def rule_answer(code: str | None = None) -> Report:
     if code.upper() not in named:
         names = (*rules, *(rule.name for rule in rules.values()))
         hint = " ".join(filter(None, (did_you_mean(code, names), "`busplan rule` lists them")))
-        raise BusplanError(f"{code}: no such rule; {hint}")
+        raise BusplanError(f"{code or repr(code)}: no such rule; {hint}")
     return rule_report(named[code.upper()])
 
 

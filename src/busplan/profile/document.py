@@ -261,7 +261,7 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
     except FileNotFoundError:
         raise BusplanError(f"{name}: no such file") from None
     except IsADirectoryError:
-        raise BusplanError(f"{name}: is a directory; give a file" if name else "'': is no name of a file") from None
+        raise BusplanError(f"{name}: is a directory; give a file") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise BusplanError(f"{name}: cannot be read: {reason}") from None

@@ -33,7 +33,7 @@ class Format(NamedTuple):
 
 _IGH: Final = r"=== Master \d+, Slave \d+ ===|SM\d+: PhysAddr 0x"
 _CANDUMP: Final = (
-    rb"(?:#[^\n]*\n|[ \t\r]*\n)*[ \t]*(?:\([ \t]*\d+\.\d+\)[ \t]+)?\S+[ \t]+"
+    rb"(?>#[^\n]*\n|[ \t\r]*\n)*+[ \t]*(?:\([ \t]*\d+\.\d+\)[ \t]+)?\S+[ \t]+"
     rb"(?:[0-9A-Fa-f]+#|(?:[RT]X [B-] [E-] +)?(?:[0-9A-F]{3}|[0-9A-F]{8}) +\[\d+\])"
 )
 _SOCKETCAN: Final = (
@@ -58,8 +58,9 @@ FORMATS: Final = (
     ),
 )
 _ROOT: Final = re.compile(
-    r"\ufeff?(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^<>\[]*(?:\[.*?\]\s*)?>)*<(?:[\w.-]+:)?([\w.-]+)", re.DOTALL
+    r"\ufeff?(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^<>\[]*(?:\[.*?\]\s*)?>)*+<(?:[\w.-]+:)?([\w.-]+)", re.DOTALL
 )
+"""The groups are possessive: tried again, each comment could end where any later one does."""
 
 
 def root_tag(content: bytes) -> str | None:
@@ -69,11 +70,16 @@ def root_tag(content: bytes) -> str | None:
     return None if match is None else match[1]
 
 
+def recordings(content: bytes) -> list[Format]:
+    """Formats of recordings that the first bytes of a file fit."""
+    head = content[:_LOOKED_AT]
+    return [each for each in FORMATS if each.head and re.match(each.head, head)]
+
+
 def matching(content: bytes) -> list[Format]:
     """Formats that the content of a file fits: none, one, or several of text."""
-    recordings = [each for each in FORMATS if each.head and re.match(each.head, content)]
-    if recordings:
-        return recordings
+    if found := recordings(content):
+        return found
     if (tag := root_tag(content)) is not None:
         return [each for each in FORMATS if tag in each.roots]
     if not content.startswith(UTF_16) and b"\0" in content[:100_000]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from io import StringIO
 from typing import Any, Final, NamedTuple
 
 from busplan.english import plural
@@ -11,7 +12,9 @@ from busplan.profile.document import text_of
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 MAX_MEASUREMENTS_BYTES: Final = 20_000_000
-"""About a million measurements; a larger file is something else."""
+"""A larger file is something else."""
+_MOST_ROWS: Final = 400_000
+"""Most measurements that are read; they bound time and memory."""
 
 REQUIRED_COLUMNS: Final = ("payload_bytes", "latency_us")
 OPTIONAL_COLUMNS: Final = ("transaction",)
@@ -66,37 +69,44 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     if len(content) > MAX_MEASUREMENTS_BYTES:
         message = f"the file is larger than {MAX_MEASUREMENTS_BYTES:,} bytes; give fewer repetitions"
         raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
-    rows = list(_rows(text_of(content, name=name, wanted="save it as CSV in UTF-8")))
-    if not rows:
+    rows = _rows(text_of(content, name=name, wanted="save it as CSV in UTF-8"))
+    line, header = next(rows, (1, []))
+    if not header:
         raise PlacedError(name, (PlacedProblem(1, 1, "missing-key", f"no header; {_EXPECTED}"),))
-    line, header = rows[0]
-    return measurements_below(header, rows[1:], line=line, name=name)
+    return measurements_below(header, rows, line=line, name=name)
 
 
 def measurements_below(
-    header: Sequence[MeasuredCell], rows: Sequence[tuple[int, Sequence[MeasuredCell]]], *, line: int, name: str
+    header: Sequence[MeasuredCell], rows: Iterable[tuple[int, Sequence[MeasuredCell]]], *, line: int, name: str
 ) -> tuple[Measurement, ...]:
     """Read the rows below a header, each with its line from 1; `line` is that of the header.
 
-    All problems are raised as one PlacedError.
+    All problems are raised as one PlacedError, and too many rows.
     """
     problems = list(_header_problems(line, header))
     if problems:
         raise PlacedError(name, tuple(problems))
     columns = [cell.text for cell in header]
-    results = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows]
-    problems = sorted(problem for result in results if isinstance(result, list) for problem in result)
+    measurements: list[Measurement] = []
+    for count, (number, cells) in enumerate(rows, start=1):
+        if count > _MOST_ROWS:
+            message = f"more than {_MOST_ROWS:,} measurements; give fewer repetitions"
+            raise PlacedError(name, (PlacedProblem(number, 1, "out-of-range", message),))
+        result = _measurement(number, dict(zip(columns, cells, strict=False)), cells, columns)
+        if isinstance(result, Measurement):
+            measurements.append(result)
+        else:
+            problems += sorted(result)
     if problems:
         raise PlacedError(name, tuple(problems))
-    measurements = tuple(result for result in results if isinstance(result, Measurement))
     if not measurements:
         raise PlacedError(name, (PlacedProblem(line, 1, "missing-key", "no measurement below the header"),))
-    return measurements
+    return tuple(measurements)
 
 
 def _rows(text: str) -> Iterator[tuple[int, list[MeasuredCell]]]:
     """Lines with values, each with its number."""
-    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
+    for number, line in enumerate(StringIO(text, newline=None), start=1):
         values = line.partition("#")[0]
         if values.strip():
             yield number, list(_cells(values))

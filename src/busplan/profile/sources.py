@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 from busplan.english import printable
 from busplan.errors import BusplanError
+from busplan.files import given_path
 from busplan.profile.document import MAX_FILE_BYTES, LoadedProfile, decode, read_bytes, too_large, validate
 
 
@@ -41,7 +42,7 @@ def locate(argument: str) -> tuple[Path, str]:
     if shipped.stem == argument and os.path.lexists(shipped):
         return shipped, shipped.name
     path = _path(argument)
-    if not argument or not os.path.lexists(path):
+    if not os.path.lexists(path):
         raise BusplanError(_unknown(argument, path))
     return path, argument
 
@@ -50,25 +51,24 @@ def _unknown(argument: str, path: Path) -> str:
     """Message for an unknown profile, with the one that may be meant: a file without its ending, or a near name."""
     from busplan.english import did_you_mean
 
-    shown = argument or repr(argument)
     with_ending = path.with_name(f"{path.name}.toml") if path.name else path
-    if argument and os.path.lexists(with_ending):
-        return f"{shown}: no such file; did you mean {argument}.toml?"
+    if os.path.lexists(with_ending):
+        return f"{argument}: no such file; did you mean {argument}.toml?"
     near = did_you_mean(argument, shipped_names())
-    if not near and argument:
+    if not near:
         beside: list[str] = []
         with suppress(OSError, ValueError):  # no such folder; a NUL in the path
             beside = sorted(file.stem for file in path.parent.glob("*.toml"))
         files = did_you_mean(path.stem, beside, write=lambda stem: f"{path.with_name(stem)}.toml")
         if files:
-            return f"{shown}: no such file; {files}"
+            return f"{argument}: no such file; {files}"
     names = ", ".join(shipped_names())
-    return f"{shown}: no such file, and no shipped profile of that name; shipped are {names}{near and f'; {near}'}"
+    return f"{argument}: no such file, and no shipped profile of that name; shipped are {names}{near and f'; {near}'}"
 
 
 def _path(argument: str) -> Path:
     """Path of an argument; the file ./- becomes absolute, because "-" means standard input."""
-    path = Path(argument)
+    path = given_path(argument)
     return path.absolute() if str(path) == "-" else path
 
 
@@ -90,13 +90,13 @@ def locate_measurements(argument: str) -> MeasurementsFile:
     """
     if argument == "-":
         return MeasurementsFile(Path("-"), "<stdin>", shipped=False)
-    if argument and os.path.lexists(argument):
-        return MeasurementsFile(_path(argument), argument, shipped=False)
+    path = _path(argument)
+    if os.path.lexists(path):
+        return MeasurementsFile(path, argument, shipped=False)
     names = sorted(path.name for path in shipped_folder().glob("*.csv"))
     if argument in names:
         return MeasurementsFile(shipped_folder() / argument, argument, shipped=True)
-    shown = argument or repr(argument)
-    raise BusplanError(f"{shown}: no such file, and no shipped example of that name; shipped is {', '.join(names)}")
+    raise BusplanError(f"{argument}: no such file, and no shipped example of that name; shipped is {', '.join(names)}")
 
 
 def load(argument: str) -> LoadedProfile:

@@ -1,6 +1,5 @@
 """`busplan.measured`: a recording compared with the plan, and the report."""
 
-import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,12 +8,19 @@ from typing import Final
 
 from busplan.buses.rule import RecordedFigure, RecordedVerdict
 from busplan.english import plural
-from busplan.errors import ArgumentError, BusplanError
+from busplan.errors import ArgumentError
 from busplan.forms import blocks
 from busplan.profile.edit import value_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.arguments import FilePath, ProfileLike, finite, load_profile, with_its_constants
+from busplan.questions.base.arguments import (
+    FilePath,
+    ProfileLike,
+    finite,
+    load_profile,
+    recording_name,
+    with_its_constants,
+)
 from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
@@ -147,11 +153,7 @@ def measured(
     share = finite(quantile, name="quantile")
     if not _LEAST_QUANTILE <= share <= 1:
         raise ArgumentError(f"quantile {share:g}: expected a share of {_LEAST_QUANTILE:g} to 1, as 0.999")
-    if not isinstance(recording, str | os.PathLike):
-        raise BusplanError(f"recording {recording!r}: expected the path of a file")
-    source = os.fspath(recording)
-    if source == "-" or "\0" in source:
-        raise BusplanError(f"{source}: a recording is read from a file")
+    source = recording_name(recording)
     recorded = bus_of(plan).recorded(
         network_of(plan),
         Path(source),

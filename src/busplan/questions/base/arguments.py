@@ -9,6 +9,7 @@ from typing import Any, Final, ParamSpec, TypeVar, cast
 from busplan.buses.network import Network
 from busplan.english import listed
 from busplan.errors import ArgumentError, BusplanError
+from busplan.files import given_path
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 from busplan.profile.document import override
 from busplan.profile.edit import value_text
@@ -120,6 +121,17 @@ def argument(path: FilePath) -> str:
     if path == "-":
         raise BusplanError("-: standard input is read by the command line alone; give a file or a shipped profile")
     return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib would resolve links
+
+
+def recording_name(recording: FilePath) -> str:
+    """Path of a recording, as it is written. Standard input, an empty path or no path raises BusplanError."""
+    if not isinstance(recording, str | os.PathLike):
+        raise BusplanError(f"recording {recording!r}: expected the path of a file")
+    source = os.fspath(recording)
+    if source == "-" or "\0" in source:
+        raise BusplanError(f"{source}: a recording is read from a file")
+    given_path(source)
+    return source
 
 
 def from_numpy(value: Any) -> Any:

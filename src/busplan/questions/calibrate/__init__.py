@@ -148,9 +148,11 @@ def _middle_distance_us(off_us: Iterable[float]) -> float:
 
 def _payload_fits(samples: Sequence[Timed], left_out: Mapping[int, Outlier]) -> tuple[PayloadFit, ...]:
     """Measurements of each payload, payloads ascending."""
+    places_by_size: defaultdict[int, list[int]] = defaultdict(list)
+    for place, sample in enumerate(samples):
+        places_by_size[sample.payload_bytes].append(place)
     fits = []
-    for size in sorted({sample.payload_bytes for sample in samples}):
-        places = [place for place, sample in enumerate(samples) if sample.payload_bytes == size]
+    for size, places in sorted(places_by_size.items()):
         kept = [samples[place] for place in places if place not in left_out]
         fits.append(
             PayloadFit(

@@ -318,7 +318,7 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     if paper and kind is not None:
         raise BusplanError(f"kind {kind!r}: cannot be used with paper=True, which is of one kind")
     if kind not in (None, *kind_names()):
-        raise BusplanError(f"{kind}: no such kind of bus; there are {', '.join(kind_names())}")
+        raise BusplanError(f"{kind or repr(kind)}: no such kind of bus; there are {', '.join(kind_names())}")
 
     def of_kind(name: str, *only: str) -> KindEvidence:
         bus = kind_named(name)

@@ -14,6 +14,18 @@ from busplan.questions.import_.xml import parsed
 EXTENDED: Final = 1 << 31
 """Flag in the number of a message with an identifier of 29 bits, as in DBC."""
 _MOST_BYTES: Final = 16_000_000
+_LONGEST_LINE: Final = 1000
+_LONGEST_TEXT: Final = 1_000_000
+"""Most characters between two quotation marks; cantools takes 200 bytes of memory for each."""
+_MOST_MESSAGES: Final = 20_000
+"""Most messages of a database, as identifiers of a log: many times those of a machine."""
+_BEGINS: Final = {
+    "dbc": r"(?m)^[ \t]*BO_ ",
+    "sym": r"(?m)^[ \t]*\[",
+    "kcd": r"<(?:\w+:)?Message\b",
+    "arxml": r"<CAN-FRAME-TRIGGERING\b",
+}
+"""Pattern of the beginning of a message, by format."""
 _NAMED: Final = {
     "dbc": r"\s*BO_ +\d+ +(\w+) *:",
     "sym": r"\s*\[\"?([^\]\"]+)\"?\]",
@@ -21,13 +33,12 @@ _NAMED: Final = {
     "arxml": r".*<SHORT-NAME>([^<]*)</SHORT-NAME>",
 }
 """Pattern of a message's name, by format."""
-_TEXT: Final = r"\"(?:[^\"\\]|\\.)*\""
+_REST: Final = r"(?:[^\";]++|\"(?:[^\"\\]++|\\.)*+(?:\"|\Z))*+(?:;|\Z)"
+"""Rest of a statement, up to its semicolon. One without it is matched to the end, so that it is read once."""
 _SIGNALS: Final = re.compile(
-    rf"^[ \t]*(?:SG_ [^\n]*$|(?:VAL_|SIG_VALTYPE_|SG_MUL_VAL_) (?:[^\";]|{_TEXT})*;)", re.MULTILINE | re.DOTALL
+    rf"^[ \t]*(?:SG_ [^\n]*$|(?:VAL_|SIG_VALTYPE_|SG_MUL_VAL_) {_REST})", re.MULTILINE | re.DOTALL
 )
-_ATTRIBUTE: Final = re.compile(
-    rf"^[ \t]*BA_(?:DEF_DEF_)? +\"([^\"\n]*)\"(?:[^\";]|{_TEXT})*;", re.MULTILINE | re.DOTALL
-)
+_ATTRIBUTE: Final = re.compile(rf"^[ \t]*BA_(?:DEF_DEF_)? +\"([^\"\n]*)\"{_REST}", re.MULTILINE | re.DOTALL)
 _DEFINED: Final = re.compile(r"^[ \t]*BA_DEF_(?:REL_)? +(?:\w+_ +)?\"([^\"\n]*)\"", re.MULTILINE)
 _NUMBERED: Final = re.compile(r"\b(BO_|SG_|BO_TX_BU_|SIG_GROUP_) +(\d{4,9})\b")
 """Number of a message where it has 4 to 9 digits: it lacks bit 31, which makes it 10."""
@@ -65,10 +76,14 @@ def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None)
     if isinstance(given, bytes):
         parsed(given, name=name, skipped=("NetworkDefinition", "AUTOSAR"))
     require_extra("cantools", extra="import", option=f"{name}: {title}", module="cantools.database")
+    if (count := sum(1 for _ in re.finditer(_BEGINS[dialect], text))) > _MOST_MESSAGES:
+        raise BusplanError(f"{name}: has {count:,} messages; of a database at most {_MOST_MESSAGES:,} are read")
+    if isinstance(given, str) and max(map(len, text.split('"'))) > _LONGEST_TEXT:
+        raise BusplanError(f"{name}: has a text of over {_LONGEST_TEXT:,} characters; no {title} of one machine has")
     database = _loaded(text, machine, dialect)
     lines: dict[str, int] = {}
     for line, content in enumerate(text.split("\n"), start=1):
-        if match := re.match(_NAMED[dialect], content):
+        if match := re.match(_NAMED[dialect], content[:_LONGEST_LINE]):
             lines.setdefault(match[1], line)
     if not database.messages:
         raise machine.refusal(1, f"a {title} without messages")
@@ -126,7 +141,7 @@ def _mended(text: str, machine: Reading) -> str:
     if undefined:
         text = _ATTRIBUTE.sub(lambda match: match[0] if match[1] in defined else _blank(match), text)
         machine.remarks.append(
-            f"{machine.file}: attributes that it does not define are left out: {', '.join(undefined)}"
+            f"{machine.file}: attributes that it does not define are left out: {first_of(undefined, _LISTED)}"
         )
     short = {int(match[2]) for match in _NUMBERED.finditer(text) if int(match[2]) > _MOST_STANDARD}
     if short:
@@ -163,6 +178,9 @@ def _say_extended(numbers: set[int], machine: Reading) -> None:
 
 
 def _blank(match: re.Match[str]) -> str:
+    """Empty lines for a statement; one that the end of the file cuts stays, so that it is refused."""
+    if match.end() == len(match.string) and not match[0].endswith(";"):
+        return match[0]
     return "\n" * match[0].count("\n")
 
 
@@ -170,12 +188,14 @@ def _of_one_bus(database: Any, machine: Reading, bus: str | None) -> list[Any]:
     """Messages of the requested bus, or of the only one."""
     buses = sorted({str(message.bus_name or "") for message in database.messages})
     if bus is None and len(buses) > 1:
-        names = ", ".join(buses)
+        names = first_of(buses, _LISTED)
         raise machine.refusal(
             1, f"messages of {len(buses)} buses, {names}: a profile describes one bus; --bus NAME reads one"
         )
     if bus is not None and bus not in buses:
-        raise machine.refusal(1, f"bus {bus}: no messages of such a bus; there are {', '.join(buses) or 'none'}")
+        raise machine.refusal(
+            1, f"bus {bus}: no messages of such a bus; there are {first_of(buses, _LISTED) or 'none'}"
+        )
     return [message for message in database.messages if bus is None or message.bus_name == bus]
 
 

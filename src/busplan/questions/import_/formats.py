@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Final
 
 from busplan.errors import BusplanError
+from busplan.files import given_path
 from busplan.profile.document import read_bytes
-from busplan.profile.machine_files import FORMATS, UTF_16, Format, matching, root_tag, text_of
+from busplan.profile.machine_files import FORMATS, UTF_16, Format, matching, recordings, root_tag, text_of
 from busplan.progress import Progress
 from busplan.questions.import_.reading import Reading
 
@@ -32,7 +33,7 @@ def read_machine(
     is of no known format or of two, or is not valid raises BusplanError, with its place.
     """
     name = "<stdin>" if argument == "-" else argument
-    content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
+    content = read_bytes(given_path(argument), name=name, limit=MOST_BYTES)
     machine_format = recognised(content, name=name)
     read = import_module(f"busplan.questions.import_.{machine_format.module}").read
     reading: Reading
@@ -57,9 +58,10 @@ def recognised(content: bytes, *, name: str) -> Format:
 
     A file of no known format, of two, or an empty or too large one raises BusplanError.
     """
-    formats = matching(content)
-    if len(content) > MOST_BYTES and not any(each.head for each in formats):
+    formats = recordings(content)
+    if not formats and len(content) > MOST_BYTES:
         raise BusplanError(f"{name}: is larger than {MOST_BYTES:,} bytes; no file of one machine is")
+    formats = formats or matching(content)
     if len(formats) > 1:
         titles = " and ".join(each.title for each in formats)
         raise BusplanError(f"{name}: has lines of {titles}; give a file for each")

@@ -9,6 +9,10 @@ from busplan.errors import BusplanError
 
 _MOST_DEPTH: Final = 64
 _MOST_ELEMENTS: Final = 1_000_000
+_MOST_KEPT: Final = 500_000
+"""Most elements that are not left out: they bound the memory."""
+_MOST_TAG_BYTES: Final = 1_000_000
+_PIECE_BYTES: Final = 100_000
 _FAR: Final = 300
 """Columns that a person counts, at most; some tools write all in one line."""
 
@@ -55,7 +59,7 @@ class _Reader:
         self.root = Element("", 0, {})
         self.open = [self.root]
         self.texts: list[str] = []
-        self.depth = self.elements = self.skips = 0
+        self.depth = self.elements = self.kept = self.skips = 0
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self._doctype
@@ -66,7 +70,12 @@ class _Reader:
     def read(self, content: bytes) -> None:
         """Read the file."""
         try:
-            self.parser.Parse(content, True)
+            for start in range(0, len(content), _PIECE_BYTES):
+                self.parser.Parse(content[start : start + _PIECE_BYTES], False)
+                # The text between two tags comes in pieces, a tag or comment as a whole.
+                if start - self.parser.CurrentByteIndex > _MOST_TAG_BYTES:
+                    raise self._refuse(f"a tag of over {_MOST_TAG_BYTES:,} bytes; no such file is a machine's")
+            self.parser.Parse(b"", True)
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
             raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
@@ -90,6 +99,9 @@ class _Reader:
         if self.skips or tag in self.skipped:
             self.skips += 1
             return
+        self.kept += 1
+        if self.kept > _MOST_KEPT:
+            raise self._refuse(f"more than {_MOST_KEPT:,} elements to read; no such file is a machine's")
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber
         element = Element(tag, f"{line}:{column + 1}" if column > _FAR else line, attributes)
         self.open[-1].children.append(element)

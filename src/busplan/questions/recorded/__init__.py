@@ -1,6 +1,5 @@
 """`busplan.recorded`: what a recording has, without a plan."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +7,7 @@ from busplan.errors import ArgumentError, BusplanError
 from busplan.forms.blocks import Report
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.arguments import FilePath, finite
+from busplan.questions.base.arguments import FilePath, finite, recording_name
 from busplan.questions.recorded.contents import (
     LogContents,
     RecordedEmergency,
@@ -74,11 +73,7 @@ def recorded(
     >>> answer = busplan.recorded("candump.log")  # doctest: +SKIP
     >>> [(row.identifier, row.comes, row.period_us) for row in answer.contents.identifiers]  # doctest: +SKIP
     """
-    if not isinstance(recording, str | os.PathLike):
-        raise BusplanError(f"recording {recording!r}: expected the path of a file")
-    source = os.fspath(recording)
-    if source == "-" or "\0" in source:
-        raise BusplanError(f"{source}: a recording is read from a file")
+    source = recording_name(recording)
     rates = [_rate(bit_rate_kbit_s, "bit_rate_kbit_s"), _rate(data_bit_rate_kbit_s, "data_bit_rate_kbit_s")]
     try:
         contents = log_contents(

@@ -1,12 +1,11 @@
 """`busplan.timeline`: one communication cycle as events, in a window."""
 
-import os
 import re
 from pathlib import Path
 from typing import Final, overload
 
 from busplan.buses.network import Network
-from busplan.errors import ArgumentError, BusplanError
+from busplan.errors import ArgumentError
 from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
@@ -16,6 +15,7 @@ from busplan.questions.base.arguments import (
     checked_models,
     finite,
     load_profile,
+    recording_name,
     require_cycle,
     whole_number,
     with_its_constants,
@@ -152,11 +152,7 @@ def _recorded(
     network: Network, recording: FilePath, cycle: object, channel: str | None, progress: Progress | None
 ) -> RecordedTimelineAnswer:
     """A cycle of a recording beside the plan."""
-    if not isinstance(recording, str | os.PathLike):
-        raise BusplanError(f"recording {recording!r}: expected the path of a file")
-    source = os.fspath(recording)
-    if source == "-" or "\0" in source:
-        raise BusplanError(f"{source}: a recording is read from a file")
+    source = recording_name(recording)
     chosen: Chosen | None = WORST if cycle == WORST else MEDIAN if cycle == MEDIAN else None
     wanted = chosen or whole_number(cycle, name="cycle")
     cycles = network.bus.recorded_cycles(
