@@ -142,8 +142,8 @@ class Bus(ABC):
         """Payloads that a plan may choose from."""
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
-        """Cycles between set-points of the fastest group with axes: the key that sets them, and their number."""
-        with_axes = [group for group in network.groups if group.axes] or network.groups
+        """Cycles between set-points of the fastest axes that get commands: the key that sets them, and their number."""
+        with_axes = [group for group in network.groups if group.axes and group.has("write")] or network.groups
         fastest = min(with_axes, key=lambda group: group.every)
         return fastest.payload_key("every"), int(fastest.every)
 

@@ -367,6 +367,9 @@ def test_a_circle_needs_axes_in_every_cycle() -> None:
     with pytest.raises(BusplanError, match=r"group\.g0\.every"):
         busplan.circle_test(busplan.load_profile(circle, changes={"group.g0.every": 2}))
     assert deciding(busplan.load_profile(circle, changes={"group.g0.every": 2})).verdict == "fits"
+    # Axes without commands have no set-points.
+    with pytest.raises(BusplanError, match=r"group\.g1\.every"):
+        busplan.circle_test(busplan.load_profile(circle, changes={"group.g0.write_bytes": 0, "group.g1.axes": 1}))
 
 
 def test_the_largest_device_counts_whatever_its_cycle() -> None:
