@@ -158,3 +158,10 @@ def test_a_baseline_finding_can_be_suppressed_and_is_judged_with_a_baseline_alon
 def test_two_suppressions_of_one_finding_leave_the_second_without_effect(changed: Changed, check: Check) -> None:
     lines = "# busplan: ignore[BP110] one\ngap_count = 63 # busplan: ignore[BP110] two"
     assert said(check(changed(('gap_count = "optimal"', lines)))) == [("BP902", 8, 16)]
+
+
+def test_with_changes_one_that_misses_is_no_finding(changed: Changed, check: Check) -> None:
+    text = changed(('"optimal"', "63  # busplan: ignore[BP110] the firmware's"))
+    assert check(text, changes={"bus.gap_count": "optimal"}).findings == ()
+    # What it hides without them is hidden with them, too.
+    assert check(text, changes={"cycle.period_us": 5000.0}).findings == ()

@@ -113,6 +113,7 @@ def test_a_unit_of_another_quantity_is_refused() -> None:
         ("nodes=3", "unknown key; did you mean bus.nodes?"),
         ("cycle.period=250", "unknown key; did you mean period_us?"),
         ("bus.gap_count=5us", "expected a whole number from 0 to 63"),
+        ("node.execution.grade=MEASURED", 'or "assumed"; did you mean "measured"?'),
         ("node.execution.base_us=3", 'unknown key where kind is "table"; it is a key of kind = "linear"'),
         ("bus.bit_rate_kbit_s=500", 'unknown key on this bus; it is a key where bus.kind is "can" or "polled"'),
         ("bus.sync_shift=0.8", 'unknown key on this bus; it is a key where bus.kind is "ethercat"'),

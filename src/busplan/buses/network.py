@@ -36,8 +36,8 @@ def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int
 
     Examples
     --------
-    >>> numbers_by_due([Rate(1), Rate(3, first=2)])
-    {(True, False): (1, 3), (True, True): (2,)}
+    >>> numbers_by_due([Rate(1), Rate(3, first=2)]), numbers_by_due([])
+    ({(True, False): (1, 3), (True, True): (2,)}, {(): (1,)})
     """
     cycles, numbers = range(1, hyperperiod(rates) + 1), dict[tuple[bool, ...], list[int]]()
     of_rate = {rate: [rate.is_due(number) for number in cycles] for rate in set(rates)}

@@ -250,3 +250,13 @@ def test_events_of_all_nodes_add_up_to_the_cycle(charge_hops: str) -> None:
     changes = {"bus.nodes": 5, "bus.charge_hops": charge_hops}
     cycle = deciding_cycle(network_of(busplan.load_profile("paper-1ms", changes=changes)))
     assert fsum(event.us for event in cycle.events()) == pytest.approx(cycle.required_us)
+
+
+@pytest.mark.parametrize(("nodes", "sync_us"), [(1, 0.3), (4, 0.6)])
+def test_the_papers_packet_that_opens_the_cycle_takes_a_ping_and_more_for_each_other_node(
+    nodes: int, sync_us: float
+) -> None:
+    (paper,) = busplan.capacity(
+        busplan.load_profile("paper-4ms", changes={"bus.nodes": nodes}), timing_model="paper"
+    ).results
+    assert paper.values()["sync_us"] == pytest.approx(sync_us)

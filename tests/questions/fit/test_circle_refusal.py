@@ -84,6 +84,8 @@ def test_answers_about_the_bus_say_nothing_of_a_circle(changes: dict[str, object
         ({"circle.path": "iso230-4", "circle.radius_mm": 1e6}, ["circle.feed_mm_per_min", "servo.step_us"]),
         # Too long for memory with the longest lead-in that there is, and not with its own.
         ({"circle.path": "iso230-4", "servo.step_us": 4}, []),
+        # Too long with its own: of a loop of 0.5 / s, 42 s.
+        ({"circle.path": "iso230-4", "servo.step_us": 4, "servo.position_gain_per_s": 0.5}, ["servo.step_us"]),
     ],
 )
 def test_a_move_is_too_short_or_too_long_as_the_simulation_has_it(changes: dict[str, object], keys: list[str]) -> None:
