@@ -6,7 +6,7 @@ import pytest
 
 import busplan
 
-NEVER_ROUND = {"servo.step_us": 1.0, "tolerance": {"max_contour_error_mm": 0.0}, "circle.feed_mm_per_min": 4000.0}
+NEVER_ROUND = {"servo.step_us": 4.0, "tolerance": {"max_contour_error_mm": 0.0}, "circle.feed_mm_per_min": 4000.0}
 """No circle holds it, so that a search for one that does has no end."""
 HOSTILE = [
     ("ethercat-servo-8", {"cycle.period_us": 60.0}),

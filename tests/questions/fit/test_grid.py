@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from itertools import product
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -121,18 +120,6 @@ def test_axes_are_those_of_whole_nodes_beside_the_others() -> None:
     assert alike == {
         place: f"axes = {axes}: no whole number of nodes, with 4 axes each" for place, axes in ((0, 0), (2, 6))
     }
-
-
-@given(sizes=st.lists(st.integers(1, 5), min_size=1, max_size=4), most=st.integers(1, 40))
-def test_chunks_are_the_grid_in_its_order_and_no_larger_than_asked(sizes: list[int], most: int) -> None:
-    grid = Grid({str(place): np.arange(size) for place, size in enumerate(sizes)})
-    rows: list[dict[str, object]] = []
-    for chunk in grid.chunks(most):
-        assert 1 <= prod(chunk.shape) <= most
-        columns = [np.broadcast_to(values, chunk.shape).ravel().tolist() for values in chunk.values.values()]
-        rows += (dict(zip(chunk.values, row, strict=True)) for row in zip(*columns, strict=True))
-    assert rows == [*grid.each_point()]
-    assert grid.points == len(rows) == prod(sizes)
 
 
 def test_settings_of_many_groups_are_refused_with_how_many_there_may_be() -> None:

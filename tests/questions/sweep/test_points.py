@@ -1,9 +1,11 @@
 """A sweep is capacity, point by point: what switches a part on or off does so at each point for itself."""
 
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomli_w
 from hypothesis import given
@@ -12,6 +14,8 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_names
 from busplan.profile.kinds import cycle_keys
+from busplan.questions.fit.grid import Grid
+from busplan.questions.sweep.table import chunks
 from busplan.sections.base import value_at
 from tests.registers import shipped_of_each_kind
 
@@ -110,3 +114,15 @@ def test_the_last_frame_comes_again_where_no_mailbox_is_asked(
 @pytest.mark.parametrize("sizes", [[0, 8], [0, 1480, 3]])
 def test_the_first_device_with_data_shares_the_first_frame(tmp_path: Path, sizes: list[float]) -> None:
     require_points(loaded(GROUPS, tmp_path), {"group.first.read_bytes": sizes, "group.third.every": [1, 8]})
+
+
+@given(sizes=st.lists(st.integers(1, 5), min_size=1, max_size=4), most=st.integers(1, 40))
+def test_chunks_are_the_grid_in_its_order_and_no_larger_than_asked(sizes: list[int], most: int) -> None:
+    grid = Grid({str(place): np.arange(size) for place, size in enumerate(sizes)})
+    rows: list[dict[str, object]] = []
+    for chunk in chunks(grid, most):
+        assert 1 <= prod(chunk.shape) <= most
+        columns = [np.broadcast_to(values, chunk.shape).ravel().tolist() for values in chunk.values.values()]
+        rows += (dict(zip(chunk.values, row, strict=True)) for row in zip(*columns, strict=True))
+    assert rows == [*grid.each_point()]
+    assert grid.points == len(rows) == prod(sizes)

@@ -52,15 +52,6 @@ def require_few_tables(network: Network, *, settings: int, most: int = MOST_TABL
         )
 
 
-class Chunk(NamedTuple):
-    """A contiguous part of a grid."""
-
-    shape: tuple[int, ...]
-    """Points along each axis of the grid."""
-    values: dict[str, Array]
-    """Values of each key, shaped to broadcast along its own axis."""
-
-
 class Grid(NamedTuple):
     """Every combination of the values of some keys; the last key changes fastest."""
 
@@ -81,27 +72,6 @@ class Grid(NamedTuple):
         """Values of the keys of each point."""
         points = product(*(axis.tolist() for axis in self.axes.values()))
         return (dict(zip(self.axes, point, strict=True)) for point in points)
-
-    def chunks(self, most: int) -> Iterator[Chunk]:
-        """Chunks of the grid in row-major order, of at most `most` points."""
-        import numpy as np
-
-        for places in cuts(self.shape, most):
-            values = [axis[place] for axis, place in zip(self.axes.values(), places, strict=True)]
-            yield Chunk(tuple(map(len, values)), dict(zip(self.axes, np.ix_(*values), strict=True)))
-
-
-def cuts(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
-    """Slices that cut an array of a shape into parts of at most `most` elements, in row-major order."""
-    # The axis to cut: a part has all values of the axes after it and one value of each axis before it.
-    cut = next(number for number in range(len(shape) + 1) if prod(shape[number + 1 :]) <= most)
-    width = max(1, most // prod(shape[cut + 1 :]))
-    places = [
-        *([slice(index, index + 1) for index in range(size)] for size in shape[:cut]),
-        *([slice(begin, min(begin + width, size)) for begin in range(0, size, width)] for size in shape[cut : cut + 1]),
-        *([slice(0, size)] for size in shape[cut + 1 :]),
-    ]
-    return product(*places)
 
 
 class GridPoint(NamedTuple):

@@ -8,7 +8,7 @@ words are added here.
 import gc
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial, reduce
-from itertools import chain
+from itertools import chain, product
 from math import prod
 from typing import Final, NamedTuple
 
@@ -25,7 +25,7 @@ from busplan.progress import Progress, ignored
 from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import VERDICTS, verdict_code
 from busplan.questions.fit.figures import COUNTS, TYPES, fit_numbers
-from busplan.questions.fit.grid import Array, Grid, cuts, require_few_tables, tables_in
+from busplan.questions.fit.grid import Array, Grid, require_few_tables, tables_in
 from busplan.questions.fit.most_nodes import MostNodes, most_and_safe_nodes
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
@@ -51,6 +51,35 @@ Columns = dict[str, Array]
 
 Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
 """
+
+
+class Chunk(NamedTuple):
+    """A contiguous part of a grid."""
+
+    shape: tuple[int, ...]
+    """Points along each axis of the grid."""
+    values: dict[str, Array]
+    """Values of each key, shaped to broadcast along its own axis."""
+
+
+def chunks(grid: Grid, most: int) -> Iterator[Chunk]:
+    """Chunks of a grid in row-major order, of at most `most` points."""
+    for places in cuts(grid.shape, most):
+        values = [axis[place] for axis, place in zip(grid.axes.values(), places, strict=True)]
+        yield Chunk(tuple(map(len, values)), dict(zip(grid.axes, np.ix_(*values), strict=True)))
+
+
+def cuts(shape: tuple[int, ...], most: int) -> Iterator[tuple[slice, ...]]:
+    """Slices that cut an array of a shape into parts of at most `most` elements, in row-major order."""
+    # The axis to cut: a part has all values of the axes after it and one value of each axis before it.
+    cut = next(number for number in range(len(shape) + 1) if prod(shape[number + 1 :]) <= most)
+    width = max(1, most // prod(shape[cut + 1 :]))
+    places = [
+        *([slice(index, index + 1) for index in range(size)] for size in shape[:cut]),
+        *([slice(begin, min(begin + width, size)) for begin in range(0, size, width)] for size in shape[cut : cut + 1]),
+        *([slice(0, size)] for size in shape[cut + 1 :]),
+    ]
+    return product(*places)
 
 
 class Part(NamedTuple):
@@ -199,7 +228,7 @@ def parts_of(sweep: Sweep, *, progress: Progress = ignored) -> Iterator[Part]:
     grid, profile = sweep.grid, sweep.profile
     done = 0
     point_cells = max(sweep.point_cells, _TABLE_CELLS * tables_in(profile))
-    for chunk in grid.chunks(max(1, min(_PART_POINTS, _PART_CELLS // point_cells))):
+    for chunk in chunks(grid, max(1, min(_PART_POINTS, _PART_CELLS // point_cells))):
         by_model = (_figures(profile, chunk.values, model, group=sweep.group) for model in sweep.timing_models)
         part = Part(chunk.shape, tuple({**chunk.values, **figures} for figures in by_model))
         yield part
