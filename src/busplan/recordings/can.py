@@ -44,21 +44,24 @@ _ERROR_FIELDS: Final = np.dtype([("stamp_s", "<f8"), ("number", "<u4")])
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader"}
 """Readers of python-can by the first bytes of a file. Any other text is read as candump's."""
 _FORMATS: Final = "text of candump, Vector's ASC and BLF, PEAK's TRC, captures of SocketCAN"
-_LINE: Final = re.compile(
-    r"(?:\([ \t]*(?P<stamp>[^\s)]+)\)[ \t]+)?(?P<channel>\S+)[ \t]+(?:(?P<frame>[0-9A-Fa-f]+#\S*)(?: [RT])?|"
-    r"(?:[RT]X (?P<switch>[B-]) [E-] +)?(?P<identifier>[0-9A-F]{3}|[0-9A-F]{8}) +\[(?P<size>\d{1,2})\] *"
-    r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *(?:'.*'|ERRORFRAME))?)"
+_HEAD: Final = r"(?:\([ \t]*([^\s)]+)\)[ \t]+)?([^\s(]\S*)[ \t]+"
+_LOGGED: Final = re.compile(
+    _HEAD + r"([0-9A-Fa-f]+)#(?:#([0-9A-Fa-f]))?(?:((?:[0-9A-Fa-f]{2})*+)|[Rr](\d{0,2}))(?: [RT])?"
 )
-"""Line of `candump -l`, or of candump's output on a terminal."""
+"""Line of `candump -l`: stamp, channel, identifier, flags of CAN FD, data, or size of a remote frame."""
+_SHOWN: Final = re.compile(
+    _HEAD + r"(?:[RT]X ([B-]) [E-] +)?([0-9A-F]{3}|[0-9A-F]{8}) +\[(\d{1,2})\] *"
+    r"(?:((?:[0-9A-F]{2} ?)*+)|remote request)(?: *(?:'.*'|ERRORFRAME))?"
+)
+"""Line of candump's output on a terminal: stamp, channel, mark of a switched bit rate, identifier, size and data."""
 _CLASSICAL_SIZE: Final = 1
 """Digits of a classical frame's size on a terminal; an FD frame has two."""
-_EXTENDED_DIGITS: Final = 8
-"""Digits of an identifier with 29 bits and flags."""
-_ERROR_FRAME: Final = "20000080"
-"""Identifier of an error frame in `candump -l`."""
+_BASE_DIGITS: Final = 3
+"""Digits of an identifier with 11 bits; one with 29 and flags has 8."""
 _PACKET: Final = Struct(">IBB2x")
 """SocketCAN's head of a frame: identifier with its flags, size, and flags of CAN FD."""
 _ERROR_FLAG, _REMOTE_FLAG, _EXTENDED_FLAG = 1 << 29, 1 << 30, 1 << 31
+_IDENTIFIER_BITS: Final = (1 << 29) - 1
 _SWITCHED_FLAG, _FD_FLAG = 1, 4
 _FD_PACKET_BYTES: Final = 72
 _REPORT_EVERY: Final = 5000
@@ -163,21 +166,14 @@ def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> C
         except _DamageError as error:
             log.broken = str(error)
         return log.frames(path)
-    require_extra("can", extra="import", option=str(path), module="can")
-    import can  # noqa: PLC0415 - an extra
-
-    # Hide its warnings about skipped frames, which are then missing in the figures.
-    logging.getLogger("can").addHandler(logging.NullHandler())
     name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
+    if name is not None:
+        require_extra("can", extra="import", option=str(path), module="can")
+        # Hide python-can's warnings about skipped frames, which are then missing in the figures.
+        logging.getLogger("can").addHandler(logging.NullHandler())
     try:
         with path.open("rb") as file:
-            reader: Any
-            if name is None:
-                reader = _candump(_CandumpText(path, file))
-            elif name == "BLFReader":
-                reader = _bounded_blf()(file)
-            else:
-                reader = getattr(can, name)(cast("Any", _Lines(file)))
+            reader = _candump(path, file) if name is None else _python_can(name, file)
             log.read(enumerate(reader, start=1), lambda: progress(min(file.tell(), size), size))
     except _DamageError as error:
         log.broken = str(error)
@@ -206,68 +202,11 @@ class _Lines:
             yield content.decode("utf-8", "replace")
 
 
-class _CandumpText(_Lines):
-    """Lines of a text of candump as `candump -l` writes them; comments are left out."""
-
-    def __init__(self, path: Path, file: BinaryIO) -> None:
-        super().__init__(file)
-        self._path = path
-        self._has_begun = self._is_error = False
-        self._last = "(0.0) can"
-        self.channel = ""
-        """Stamp and channel of the last frame, for an error frame without them."""
-
-    def __iter__(self) -> Iterator[str]:
-        for number, content in enumerate(super().__iter__(), start=1):
-            line = content.strip()
-            if not line or line.startswith("#") or (self._is_error and content.startswith("\t")):
-                # The last: `candump -e` writes in words what an error frame says.
-                continue
-            frame = self._frame(line, number)
-            self._is_error = frame.endswith(f" {_ERROR_FRAME}#")
-            yield frame
-
-    def _frame(self, line: str, number: int) -> str:
-        match = _LINE.fullmatch(line)
-        if match is None:
-            if "ERRORFRAME" in line:
-                return f"{self._last} {_ERROR_FRAME}#"
-            if not self._has_begun:
-                raise BusplanError(f"{self._path}: is not a CAN log in a known format: {_FORMATS}")
-            raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
-        self._has_begun = True
-        if match["stamp"] is None:
-            raise _DamageError(f"line {number} has no time; record with `candump -l`")
-        frame = match["frame"]
-        if frame is None:
-            is_fd, data = len(match["size"]) > _CLASSICAL_SIZE, match["data"].replace(" ", "")
-            mark = f"##{int(match['switch'] == 'B')}" if is_fd else "#"
-            content = f"R{match['size']}" if data.startswith("r") else data
-            frame = f"{match['identifier']}{mark}{content}"
-        self.channel = match["channel"]
-        self._last = f"({match['stamp']}) {self.channel}"
-        identifier = frame.partition("#")[0]
-        # python-can takes for an error frame one with the flag of a bus error alone.
-        if len(identifier) == _EXTENDED_DIGITS and int(identifier, 16) & _ERROR_FLAG:
-            frame = f"{_ERROR_FRAME}#"
-        return f"{self._last} {frame}"
-
-
-def _candump(text: _CandumpText) -> Iterator[Any]:
-    """Messages of a text; python-can gives error frames no channel."""
-    import can  # noqa: PLC0415 - an extra
-
-    for message in can.CanutilsLogReader(cast("Any", text)):
-        if message.is_error_frame:
-            message.channel = text.channel
-        yield message
-
-
-class _CapturedFrame(NamedTuple):
-    """A frame of a capture, with the attributes of python-can's."""
+class _Frame(NamedTuple):
+    """A frame of a text or a capture, with the attributes of python-can's."""
 
     timestamp: float
-    channel: int
+    channel: str
     arbitration_id: int
     is_extended_id: bool
     is_remote_frame: bool
@@ -278,7 +217,62 @@ class _CapturedFrame(NamedTuple):
     data: bytes
 
 
-def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[tuple[int, _CapturedFrame]]:
+_NO_FRAME: Final = _Frame(0.0, "can", 0, False, False, False, False, False, 0, b"")
+
+
+def _candump(path: Path, file: BinaryIO) -> Iterator[_Frame]:
+    """Frames of a text of `candump -l`, or of what candump writes on a terminal."""
+    last: _Frame | None = None
+    for number, content in enumerate(_Lines(file), start=1):
+        line = content.strip()
+        if not line or line[0] == "#" or (content[0] == "\t" and last is not None and last.is_error_frame):
+            # The last: `candump -e` writes in words what an error frame says.
+            continue
+        frame = _candump_frame(line)
+        if frame is None and "ERRORFRAME" in line:
+            frame = (last or _NO_FRAME)._replace(is_error_frame=True)
+        elif frame is None and last is None:
+            raise BusplanError(f"{path}: is not a CAN log in a known format: {_FORMATS}")
+        elif frame is None:
+            raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
+        elif line[0] != "(":
+            raise _DamageError(f"line {number} has no time; record with `candump -l`")
+        last = frame
+        yield frame
+
+
+def _candump_frame(line: str) -> _Frame | None:
+    """Frame of a line, with a NaN for a stamp that is missing or no number; None of any other text."""
+    data: str | None
+    if match := _LOGGED.fullmatch(line):
+        stamp, channel, identifier, flags, data, asked = match.groups()
+        is_fd, is_switched = flags is not None, flags is not None and bool(int(flags, 16) & _SWITCHED_FLAG)
+    elif match := _SHOWN.fullmatch(line):
+        stamp, channel, switch, identifier, asked, data = match.groups()
+        is_fd, is_switched = len(asked) > _CLASSICAL_SIZE, switch == "B"
+    else:
+        return None
+    number, is_extended = int(identifier, 16), len(identifier) > _BASE_DIGITS
+    content = bytes.fromhex(data or "")
+    try:
+        stamp_s = float(stamp or nan)
+    except ValueError:
+        stamp_s = nan
+    return _Frame(
+        stamp_s,
+        channel,
+        number & _IDENTIFIER_BITS,
+        is_extended,
+        data is None,
+        is_extended and number & _ERROR_FLAG != 0,
+        is_fd,
+        is_switched,
+        int(asked or 0) if data is None else len(content),
+        content,
+    )
+
+
+def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[tuple[int, _Frame]]:
     """Frames of a SocketCAN capture, each with the number of its packet."""
     notes = CaptureNotes()
     for piece in packets(path, notes, link=SOCKETCAN, progress=progress):
@@ -289,10 +283,10 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[tuple[int
                 continue
             flagged, length, flags = _PACKET.unpack_from(content, start)
             is_extended = bool(flagged & _EXTENDED_FLAG)
-            frame = _CapturedFrame(
+            frame = _Frame(
                 int(stamp_ns) / 1e9,
-                0,
-                flagged & ((1 << 29 if is_extended else 1 << 11) - 1),
+                "0",
+                flagged & (_IDENTIFIER_BITS if is_extended else (1 << 11) - 1),
                 is_extended,
                 bool(flagged & _REMOTE_FLAG),
                 bool(flagged & _ERROR_FLAG),
@@ -312,6 +306,15 @@ def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[tuple[int
 
 class _DamageError(Exception):
     """Damage: something in a log that no bus sends, named by the text."""
+
+
+def _python_can(reader: str, file: BinaryIO) -> Iterator[Any]:
+    """Messages of a log by a reader of python-can."""
+    import can  # noqa: PLC0415 - an extra
+
+    if reader == "BLFReader":
+        return iter(_bounded_blf()(file))
+    return iter(getattr(can, reader)(cast("Any", _Lines(file))))
 
 
 def _bounded_blf() -> Any:
