@@ -192,7 +192,7 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
 
 MOST_CYCLES: Final = 1000
 """Longest hyperperiod that is computed [cycles]."""
-_MOST_WORK: Final = 1_500_000
+_MOST_WORK: Final = 800_000
 _WORK_BESIDE: Final = 40
 """Most groups squared, times their cycles and what takes as long as so many: the time to count nodes of each group."""
 
