@@ -250,6 +250,15 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
         ),
         (("init", "x", "--group", "a:1x1:4/4", "--bytes-per-axis", "2"), "--bytes-per-axis: nothing takes it"),
         (("init", "x", "--group", "a:1x0:0/0"), "group.a.write_bytes = 0: makes 0 bytes"),
+        (
+            ("init", "x", "--bus", "can", *(word for number in range(128) for word in ("--group", f"g{number}:1x1"))),
+            "group: has 128 entries, must have 127 or fewer",
+        ),
+        (("init", "x", "--bus", "ethercat", "--nodes", "1000001"), "bus.nodes = 1000001: must be 1,000,000 or less"),
+        (
+            ("init", "x", "--bus", "can", "--host", "stock", "--period", "2us"),
+            "--host stock: bus.sync_jitter_us = 235000: is not under cycle.period_us, 2: ",
+        ),
         (("init", "x", "--from", "dvrk", "--group", "a:1x1"), "--from: cannot be used with --group"),
         (("init", "a\nb"), r"'a\nb': no name for a profile; expected 1 to 100 printable characters"),
         (("init", "\x1b[31m"), r"'\x1b[31m': no name for a profile"),
