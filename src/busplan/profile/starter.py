@@ -194,7 +194,7 @@ def _checked(text: str, *, name: str) -> str:
     try:
         validate(decode(text.encode(), name=name))
     except PlacedError as refused:
-        problems = [problem for problem in refused.placed if problem.key != "name"]
+        problems = [problem for problem in refused.placed if problem.key not in ("", "name")]
         if problems:
             raise BusplanError(*(problem.message for problem in problems)) from None
         raise _nameless(name) from None
