@@ -44,6 +44,8 @@ def test_each_constraint_asks_for_a_slice_or_for_a_period() -> None:
     assert (sync0.key, sync0.slice_us, round(sync0.least_us, 1)) == ("sync0", 0.0, 668.3)
     assert unmet(network) == [node, sync0]
     assert unmet(at_period(network, 500.0)) == [sync0]
+    # Its own period plays no part.
+    assert list(to_be_shown(at_period(network, 4000.0))) == [time, node, sync0]
     # A slice is a share of the period, a period is not.
     assert (time.period_us(0.5), node.period_us(0.5)) == (2 * time.slice_us, node.least_us)
 

@@ -67,6 +67,14 @@ def test_an_array_is_answered_as_each_of_its_points(asked: list[tuple[str, int, 
         assert whole.tolist() == [[getattr(one, name) for one in row] for row in alone]
 
 
+@pytest.mark.parametrize("most", [127, 128, 129, 1000])
+def test_a_bus_for_hundreds_of_nodes_is_counted_to_the_end(most: int) -> None:
+    limits = [limit_of("line", 5000, False), limit_of("line", most, False)]
+    assert most_nodes(NETWORK.with_nodes, limits)[:2] == (most, 1)
+    found = most_nodes(NETWORK.with_nodes, [limit_of("line", np.array([5, most]), False)])
+    assert found.nodes.tolist() == [5, most]
+
+
 def groups_of(kind: str, number: int) -> str:
     """A profile of groups that are not alike."""
     group = """

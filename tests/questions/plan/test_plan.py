@@ -148,6 +148,9 @@ ETHERCAT: dict[str, Any] = {"payload.read_bytes": 400, "payload.write_bytes": 70
         ),
         ("", {"cycle.period_us": 400.0}, "period", {"cycle.period_us": 475.0}, {"cycle.period_us": 474.0}),
         ("", {"cycle.period_us": 2000.0, "bus.nodes": 9}, "nodes", {"bus.nodes": 7}, {"bus.nodes": 8}),
+        # One node less, and the last one: a cycle of two takes 237.4 us.
+        ("", {"cycle.period_us": 2000.0, "bus.nodes": 8}, "nodes", {"bus.nodes": 7}, {"bus.nodes": 8}),
+        ("", {"cycle.period_us": 400.0, "bus.nodes": 3}, "nodes", {"bus.nodes": 1}, {"bus.nodes": 2}),
         # Quadlets of the larger payload alone, and of both; single bytes.
         (
             "",
@@ -254,6 +257,11 @@ def test_every_step_changes_one_thing_more_until_one_is_enough() -> None:
     assert [one.title for one in slower.options] == ["as it is", "gap count", "+ slice ratio", "+ period"]
     assert slower.options[2].changes == answer.options[2].changes
     assert slower.period_is_kept is False
+
+
+def test_where_too_few_nodes_are_still_too_many_a_single_one_comes_nearest(make: Make) -> None:
+    answer = busplan.plan(make(bus__gap_count="optimal", bus__nodes=5, cycle__period_us=100.0), free=["nodes"])
+    assert [(one.changes, one.held_by) for one in answer.options] == [({}, "time"), ({"bus.nodes": 1}, "time")]
 
 
 def test_nothing_to_change(make: Make) -> None:

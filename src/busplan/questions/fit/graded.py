@@ -163,10 +163,6 @@ class HeavyAssumption(NamedTuple):
         """Whether the key is a bit rate, which is looked up and not measured."""
         return self.keys[0].endswith("bit_rate_kbit_s")
 
-    def covers(self, key: str) -> bool:
-        """Whether a key is one of `keys`, or in a section among them."""
-        return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
-
 
 def heavy_assumptions(figures: FitFigures, network: Network) -> tuple[HeavyAssumption, ...]:
     """The assumptions that carry more than a quarter of the variance or of the time; of messages alone, of the load."""
