@@ -112,6 +112,9 @@ def test_the_answer_says_findings_failures_and_what_they_add_up_to(mixed: Answer
     assert summary == "checked 3 profiles: 2 errors, 1 warning; 1 could not be checked"
     assert [block.state for block in mixed.report().blocks] == ["warns", "fails", "fails", "fails", "fails"]
     assert [block.state for block in warned.report().blocks] == ["warns", "warns"]
+    # An error alone fails, and so does a file that cannot be checked.
+    for found in (report(mixed, finding_at(warned, 1, 1, 2)), busplan.check("gone.toml")):
+        assert [block.state for block in found.report().blocks] == ["fails", "fails"]
 
 
 # JSON
@@ -273,6 +276,9 @@ def test_a_line_is_cut_where_it_is_wider_than_the_page(full_of: Callable[..., li
     whole, rule = "a" * 94, " unknown-key"
     assert marked_line(full_of, f"{whole}b", 1, 2) == (f"{whole}b", f"^{rule}")
     assert marked_line(full_of, f"{whole}bc", 1, 2) == (f"{'a' * 89}...", f"^{rule}")
+    # The name of the rule takes 12.
+    assert marked_line(full_of, f"{whole}b", 83, 84) == (f"{whole}b", f"{' ' * 82}^{rule}")
+    assert marked_line(full_of, f"{whole}b", 84, 85) == (f"{whole}b", f"{' ' * 83}^")
     # The mark is shown first, and where it fills the line alone, without the name of the rule.
     long = f"key = {'x' * 88} end"
     assert marked_line(full_of, long, 7, 95) == (f"... {'x' * 88}...", f"    {'^' * 88}")

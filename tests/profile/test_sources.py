@@ -13,7 +13,8 @@ from busplan import BusplanError
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.profile.document import decode, profile_of, read_bytes
 from busplan.profile.edit import profile_text
-from busplan.profile.sources import Collection, collect
+from busplan.profile.kinds import kinds_with
+from busplan.profile.sources import Collection, collect, locate_measurements
 
 LINE = """\
 schema_version = 1
@@ -86,6 +87,19 @@ def test_what_is_read_is_bounded_and_what_cannot_be_read_says_why(monkeypatch: p
     monkeypatch.setattr(sys, "stdin", None)
     with pytest.raises(BusplanError, match=r"^x: standard input is closed$"):
         read_bytes(Path("-"), name="x")
+
+
+def test_an_array_is_a_key_of_the_kinds_that_have_it_and_so_is_a_place_in_it() -> None:
+    assert kinds_with(("message",)) == kinds_with(("message", 0)) == kinds_with(("message", 0, "period_us")) == ["can"]
+    assert kinds_with(("message", 0, "gap_count")) == []
+
+
+def test_measurements_are_a_file_before_they_are_the_shipped_example() -> None:
+    shipped = locate_measurements("table-1.csv")
+    assert (shipped.name, shipped.shipped, shipped.path.is_file()) == ("table-1.csv", True, True)
+    Path("table-1.csv").write_text("")
+    assert locate_measurements("table-1.csv") == (Path("table-1.csv"), "table-1.csv", False)
+    assert locate_measurements("-") == (Path("-"), "<stdin>", False)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16-le", "cp1252"])

@@ -213,6 +213,15 @@ def test_an_error_frame_without_a_stamp_is_one_that_came_at_no_time(tmp_path: Pa
     assert frames.lead_us == 1e6
 
 
+def test_progress_is_the_part_of_the_log_that_was_read(tmp_path: Path) -> None:
+    path, told = tmp_path / "bus.log", list[tuple[int, int]]()
+    path.write_text("(1700000000.000000) can0 123#\n" * 11_000)
+    read_can(path, progress=lambda *sizes: told.append(sizes))
+    (first, size), (second, _) = told
+    assert size == path.stat().st_size == 30 * 11_000
+    assert 30 * 5000 <= first < second < size
+
+
 def test_channels_are_counted_up_to_a_bound(tmp_path: Path) -> None:
     def log(channels: int) -> str:
         return "".join(f"(1.{number:06d}) can{number} 181#00\n" for number in range(channels))

@@ -190,6 +190,9 @@ def test_the_line_of_medians_is_numpys_weighted_fit() -> None:
 def test_too_few_events_or_all_at_once_have_no_period() -> None:
     assert periodic_events(np.arange(0.0, 900.0, 100.0)) is None
     assert periodic_events(np.zeros(20)) is None
+    fast = periodic_events(np.arange(40) / 2)
+    assert fast is not None
+    assert fast.period_us == pytest.approx(0.5)
     found = periodic_events(np.arange(0.0, 1000.0, 100.0))
     assert found is not None
     assert found.period_us == pytest.approx(100)

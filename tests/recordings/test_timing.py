@@ -265,6 +265,7 @@ def test_identifiers_have_the_names_of_the_predefined_connection_set(tmp_path: P
     for identifier, name, most in ((0x000, "NMT", 2), (0x080, "SYNC", 1), (0x100, "TIME", 6)):
         expected |= {(identifier, size): Role(name, None) if size <= most else None for size in (0, most, most + 1)}
     expected |= {(identifier, 8): None for identifier in (0x001, 0x101, 0x681, 0x781, 0x7FF)}
+    expected |= {(identifier, 0): None for identifier in (0x001, 0x101, 0x681)}
     for size in range(9):
         some = {identifier: what for (identifier, of), what in expected.items() if of == size}
         lines = [(100 * place, f"{identifier:03X}#{'00' * size}") for place, identifier in enumerate(some)]

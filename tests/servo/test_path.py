@@ -9,8 +9,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
-from busplan.servo.path import circle_path
-from busplan.servo.runnable import MAX_SETPOINTS, move_along
+from busplan.servo.parameters import LoopTiming
+from busplan.servo.path import circle_path, measured_part
+from busplan.servo.runnable import MAX_SETPOINTS, move_along, unfit_move
 
 
 @pytest.mark.parametrize(
@@ -133,6 +134,24 @@ def test_a_circle_too_short_for_its_feed_is_refused_with_what_would_do() -> None
         circle_path(0.5, feed_mm_per_min=20_000.0, period_us=100.0, ramp_periods=100)
     assert "radius_mm = 0.5" in str(caught.value)
     circle_path(0.5, feed_mm_per_min=18_849.5, period_us=100.0, ramp_periods=100)
+
+
+def test_a_million_set_points_are_a_circle_and_one_more_is_none() -> None:
+    # A turn of a second in periods of 1 us; a ramp of a period makes it one period longer.
+    turn: dict[str, Any] = {"feed_mm_per_min": 60 * 2 * math.pi, "period_us": 1.0, "settling_us": None}
+    moves = [move_along(1.0, ramp_periods=ramp, **turn) for ramp in (0, 1)]
+    assert [(move.setpoints, [*unfit_move(move, radius_mm=1.0)] == []) for move in moves] == [
+        (MAX_SETPOINTS, True),
+        (MAX_SETPOINTS + 1, False),
+    ]
+
+
+@pytest.mark.parametrize(("turn_us", "steps", "share"), [(80.0, 1, 0.8), (120.0, 2, 0.2), (250.0, 3, 0.5)])
+def test_a_turn_has_as_many_steps_of_100_us_as_it_begins(turn_us: float, steps: int, share: float) -> None:
+    feed_mm_per_min = 60 * 2 * math.pi * 1e-3 / (turn_us * 1e-6)
+    path = circle_path(1e-3, feed_mm_per_min=feed_mm_per_min, period_us=1000.0, ramp_periods=0, settling_us=0.0)
+    part = measured_part(path, timing=LoopTiming(period_us=1000.0), margins=())
+    assert (part.steps.stop - part.steps.start, part.turn_share) == (steps, pytest.approx(share))
 
 
 def test_all_bad_values_are_reported_together() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.fit.figures import after_reset
+from busplan.questions.fit.figures import after_reset, cycle_figures
 from busplan.questions.fit.figures import figures as figures_of
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import value_at
@@ -304,3 +304,11 @@ def test_a_reset_is_told_where_the_cycle_fits_before_it_and_not_after_it(
     network = network_of(make(**bus, cycle__period_us=period_us, node__execution__grade="measured"))
     after = after_reset(network, figures_of(network, model="standard"))
     assert (None if after is None else after.verdict) == then
+
+
+def test_where_neither_a_bias_nor_a_doubt_is_known_u_is_unknown_and_not_0() -> None:
+    exact = {"kind": "linear", "grade": "measured", "base_us": 100, "per_byte_us": 0, "uncertainty_us": 0}
+    network = network_of(busplan.load_profile("can-servo-8", changes={"node.execution": exact}))
+    fit = cycle_figures(network, model=network.bus.deciding_model)
+    assert [doubt.us for doubt in fit.doubts] == [0.0, 0.0]
+    assert (fit.bias_us, fit.uncertainty_us) == (None, None)
