@@ -113,7 +113,8 @@ def test_the_answer_says_findings_failures_and_what_they_add_up_to(mixed: Answer
     assert [block.state for block in mixed.report().blocks] == ["warns", "fails", "fails", "fails", "fails"]
     assert [block.state for block in warned.report().blocks] == ["warns", "warns"]
     # An error alone fails, and so does a file that cannot be checked.
-    for found in (report(mixed, finding_at(warned, 1, 1, 2)), busplan.check("gone.toml")):
+    gone: Answer = busplan.check("gone.toml")
+    for found in (report(mixed, finding_at(warned, 1, 1, 2)), gone):
         assert [block.state for block in found.report().blocks] == ["fails", "fails"]
 
 

@@ -38,8 +38,8 @@ def test_other_payloads_of_each_group_have_their_bytes_and_times() -> None:
     assert (alike.read_bytes, alike.read_execution_us, alike.write_bytes, alike.write_execution_us) == (4, 36.8, 0, 0)
     # At each point of an array, too.
     (_, _, io) = with_payloads(gantry, [(4, 16), (32, 0), (np.array([0, 8]), 20)]).groups
-    assert io.read_execution_us.tolist() == [0.0, pytest.approx(5.8)]
-    assert io.read_uncertainty_us.tolist() == [0.0, pytest.approx(5.8 / 3**0.5)]
+    assert np.asarray(io.read_execution_us).tolist() == [0.0, pytest.approx(5.8)]
+    assert np.asarray(io.read_uncertainty_us).tolist() == [0.0, pytest.approx(5.8 / 3**0.5)]
 
 
 EXECUTION = {"kind": "linear", "grade": "measured", "base_us": 1, "per_byte_us": 0}

@@ -72,7 +72,7 @@ def test_a_bus_for_hundreds_of_nodes_is_counted_to_the_end(most: int) -> None:
     limits = [limit_of("line", 5000, False), limit_of("line", most, False)]
     assert most_nodes(NETWORK.with_nodes, limits)[:2] == (most, 1)
     found = most_nodes(NETWORK.with_nodes, [limit_of("line", np.array([5, most]), False)])
-    assert found.nodes.tolist() == [5, most]
+    assert np.asarray(found.nodes).tolist() == [5, most]
 
 
 def groups_of(kind: str, number: int) -> str:
