@@ -39,6 +39,9 @@ def warned(profile: busplan.Profile) -> list[str]:
 def test_a_verdict_names_the_assumptions_that_carry_it(name: str, keys: list[str], carries: str) -> None:
     profile = busplan.load_profile(name)
     assert heavy(profile) == {tuple(keys): carries}
+    # The larger share, the weight of a finding.
+    (one,) = busplan.capacity(profile).verdicts[0].assumptions
+    assert f" {one.share:.0%} of the variance" in carries
     *before, last = keys
     names, them = (f"{', '.join(before)} and {last}", "them") if before else (last, "it")
     assert said(profile) == [f"{names}: measure {them} first"]

@@ -75,6 +75,12 @@ def test_a_bus_for_hundreds_of_nodes_is_counted_to_the_end(most: int) -> None:
     assert np.asarray(found.nodes).tolist() == [5, most]
 
 
+def test_a_limit_that_is_just_kept_by_any_number_is_not_the_one_that_sets_it() -> None:
+    just_kept = limit_of("none", np.array([-1, 0]), True)
+    found = most_nodes(NETWORK.with_nodes, [just_kept, limit_of("line", 20, False)])
+    assert found.words_at(2) == [(0, "none"), (20, "line")]
+
+
 def groups_of(kind: str, number: int) -> str:
     """A profile of groups that are not alike."""
     group = """
