@@ -46,6 +46,18 @@ def an_axis(**changes: Any) -> Axis:
     return Axis(**(values | changes))
 
 
+@pytest.mark.parametrize(
+    ("gain_per_s", "periods"),
+    [(500.0, math.log(1000) / math.log(2)), (900.0, 3.0), (1000.0, 1.0), (1500.0, math.log(1000) / math.log(2))],
+)
+def test_an_error_falls_to_a_thousandth_by_its_share_in_each_period(gain_per_s: float, periods: float) -> None:
+    # |1 - kp T| of it is left after a period; where that is nothing, a period is enough.
+    timing = LoopTiming(period_us=1000.0, step_us=1000.0)
+    assert loop_margins(an_axis(position_gain_per_s=gain_per_s), timing=timing).settling_us == pytest.approx(
+        1000 * periods
+    )
+
+
 # --- simulated against its states -----------------------------------------------------------------------------
 
 

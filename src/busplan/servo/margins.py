@@ -99,7 +99,8 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
     turn, gain_one = _phase_margin(angles, numerator, denominator)
     period_s = timing.control_period_us / _US_PER_S
     slowest = float(outside.max())
-    settling = 2 * math.log(_SETTLED) / math.log1p(slowest) if slowest > -1 else 1.0
+    # No loop settles sooner than after a period, and one with poles at 0 does, rounding aside.
+    settling = max(1.0, 2 * math.log(_SETTLED) / math.log1p(slowest)) if slowest > -1 else 1.0
     return LoopMargins(
         stable=True,
         phase_margin_deg=turn,

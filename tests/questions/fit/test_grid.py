@@ -76,6 +76,8 @@ GRIDS: dict[str, dict[str, list[object]]] = {
     # And one of two timing models cannot express a retry.
     "paper-1ms": {"bus.gap_count": [63, "optimal"], "cycle.retries": [0, 2], "bus.nodes": [1, 9]},
     "sercos3-servo-8": {"bus.version": ["V1.0", "V1.1"], "cycle.period_us": [250, 500], "bus.nodes": [3, 60]},
+    # A truth value is no number.
+    "ethercat-servo-8": {"bus.distributed_clocks": [False, True], "cycle.period_us": [800, 1000]},
     # Responses are searched, point by point.
     "can-servo-8": {"bus.nodes": [3, 8]},
 }
