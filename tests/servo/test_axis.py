@@ -314,13 +314,21 @@ def test_an_encoder_too_fine_for_the_travel_is_refused() -> None:
         (np.array([0.0, math.nan]), np.zeros(2)),
         (np.zeros(5), np.zeros(4)),
         (np.zeros(3), np.array([1.0, 0.0, 0.0])),
-        (np.zeros(3), np.array([0.0, 501.0, 0.0])),
+        (np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        (np.zeros(3), np.array([0.0, 500.5, 0.0])),
+        (np.zeros(3), np.array([0.0, -500.5, 0.0])),
     ],
 )
 def test_arrivals_that_do_not_fit_never_reach_the_kernel(setpoints: Floats, offsets_us: Floats) -> None:
     arriving = Arrivals(offsets_us=offsets_us, lost=np.zeros(len(offsets_us), dtype=bool))
     with pytest.raises(ValueError, match=r"must|for"):
         simulate_axis(setpoints, axis=an_axis(), timing=TIMING, arrivals=arriving)
+
+
+def test_a_setpoint_may_be_half_a_period_early_or_late() -> None:
+    for half_us in (-500.0, 500.0):
+        arriving = Arrivals(offsets_us=np.array([0.0, half_us, 0.0]), lost=np.zeros(3, dtype=bool))
+        assert not simulate_axis(np.zeros(3), axis=an_axis(), timing=TIMING, arrivals=arriving).any()
 
 
 def test_on_time_is_the_default() -> None:
