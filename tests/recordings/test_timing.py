@@ -220,6 +220,19 @@ def test_a_bit_rate_is_as_high_as_frames_need_that_do_not_overlap(tmp_path: Path
 
 
 @pytest.mark.parametrize(
+    ("at_rate", "later", "shown"), [(10, 0, 500), (9, 0, None), (12, 3, 500), (12, 4, None), (12, 50, None)]
+)
+def test_a_bit_rate_is_shown_by_ten_frames_and_four_fifths_of_those_that_follow_closely(
+    at_rate: int, later: int, shown: float | None, tmp_path: Path
+) -> None:
+    bits = int(log(tmp_path, [(0, "181#55")]).bits[0])
+    # At 500 kbit/s a bit takes 2 us; a frame that comes 7 % later seems to be at 465 kbit/s.
+    apart_us = [2 * bits] * at_rate + [round(2 * bits * 1.07)] * later
+    frames = log(tmp_path, [(int(us), "181#55") for us in np.cumsum([0, *apart_us])])
+    assert can_timing.shown_bit_rate(frames, can_timing.longest_stretch(frames), [500.0]) == shown
+
+
+@pytest.mark.parametrize(
     ("times_us", "late_us"),
     [
         ([0, 100, 300, 400], 0),  # each as soon as the bus allows, or later
