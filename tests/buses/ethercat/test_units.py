@@ -372,6 +372,18 @@ def test_a_circle_needs_axes_in_every_cycle() -> None:
         busplan.circle_test(busplan.load_profile(circle, changes={"group.g0.write_bytes": 0, "group.g1.axes": 1}))
 
 
+def test_a_drive_may_work_as_long_as_its_own_cycles() -> None:
+    """Before SYNC0 and behind it: 2 x 300 us are over 500 us, and under two cycles."""
+    plan = profile([(1, 4, 20, 12), (2, 4, 20, 12)], axes=1, distributed_clocks=True, sync_shift=0.0)
+    for group, exceeds in (("g0", True), ("g1", False)):
+        slow = busplan.load_profile(plan, changes={f"group.{group}.execution.base_us": 300.0})
+        assert ("node" in deciding(slow).exceeded) == exceeds
+
+
+def test_terminals_without_data_and_axes_without_a_byte_are_a_group() -> None:
+    assert deciding(profile([(1, 4, 20, 12), (1, 3, 0, 0)])).verdict == "fits"
+
+
 def test_the_largest_device_counts_whatever_its_cycle() -> None:
     assert "payload" in deciding(profile([(1, 9, 400, 0), (2, 1, 1487, 0), (2, 9, 400, 0)])).exceeded
 

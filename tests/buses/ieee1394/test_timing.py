@@ -53,6 +53,16 @@ def test_standard_packets_have_their_sizes_on_the_wire(case: tuple[str, int], si
     assert (phases["request_bytes"], phases["response_bytes"]) == sizes
 
 
+@pytest.mark.parametrize("answer", ["unified", "split"])
+def test_a_host_slower_than_the_gap_lengthens_a_transaction_by_what_it_is_slower(answer: str) -> None:
+    fast, slow = (
+        phases_of("write", "standard", node__write_response=answer, host__transaction_us=us) for us in (0.0, 100.0)
+    )
+    gap_us = fast["idle_us"] or 0.0
+    assert gap_us > 0
+    assert (slow["transaction_us"] or 0.0) - (fast["transaction_us"] or 0.0) == pytest.approx(100.0 - gap_us)
+
+
 @pytest.mark.parametrize("kind", ["read", "write"])
 def test_paper_charges_the_payload_and_20_bytes_to_both_packets(kind: str) -> None:
     phases = phases_of(kind, "paper", **{f"payload__{kind}_bytes": 13})

@@ -741,6 +741,28 @@ def test_messages_alone_have_no_fault_of_a_cycle(tmp_path: Path) -> None:
     assert "error frames" in [figure.quantity for figure in answer.outside]
 
 
+@pytest.mark.parametrize(("cycles", "said"), [(22, "18"), (23, "19")])
+def test_the_first_cycles_have_no_fault_and_the_last_ends_where_the_log_does(cycles: int, said: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=f"fault missing-pdo: 5 times; of {said} cycles that may have it"):
+        busplan.emulate("can-servo-8", cycles=cycles, fault={"missing-pdo": 5})
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "share"),
+    [
+        ("can-servo-8", "jitter", 0.5),
+        ("can-servo-8", "late-command", 1.0),
+        ("ethercat-servo-8", "jitter", 0.25),
+        ("can-motors-8", "slow-node", 0.3),
+        ("can-motors-8", "slow-host", 0.3),
+    ],
+)
+def test_a_fault_without_a_time_takes_its_share_of_the_period(name: str, fault: str, share: float) -> None:
+    us = share * busplan.load_profile(name).cycle.period_us
+    ours, given = (busplan.emulate(name, cycles=40, fault={fault: to}) for to in (None, us))
+    assert ours.content == given.content
+
+
 def test_only_kinds_whose_recordings_are_read_are_emulated() -> None:
     kinds: Mapping[str, Any] = {name: kind_named(name) for name in kind_names()}
     assert [bool(kind.recordings) for kind in kinds.values()] == [bool(kind.emulator()) for kind in kinds.values()]
