@@ -378,6 +378,9 @@ def test_a_drive_may_work_as_long_as_its_own_cycles() -> None:
     for group, exceeds in (("g0", True), ("g1", False)):
         slow = busplan.load_profile(plan, changes={f"group.{group}.execution.base_us": 300.0})
         assert ("node" in deciding(slow).exceeded) == exceeds
+    both = busplan.load_profile(plan, changes={f"group.{group}.execution.base_us": 300.0 for group in ("g0", "g1")})
+    (line,) = (line for line in str(busplan.capacity(both)).splitlines() if "  limit  " in line)
+    assert line.endswith("  g0: a node's execution takes 600.0 +/- 0.1 us of its 500.0 us")
 
 
 def test_terminals_without_data_and_axes_without_a_byte_are_a_group() -> None:
