@@ -322,6 +322,10 @@ def test_a_protocol_of_the_users_own(tmp_path: Path) -> None:
     assert required_us(path) == by_hand_us
     (derivation,) = busplan.explain(path, "required_us", timing_model="standard").derivations
     assert derivation.value == by_hand_us
+    # Nobody answers a write: five times of nodes count, and what each may err.
+    doubtful = busplan.load_profile(path, changes={"node.execution.uncertainty_us": 3.0})
+    doubts = busplan.capacity(doubtful).verdicts[0].deciding.doubts
+    assert [doubt.us for doubt in doubts if doubt.key == "node.execution"] == [5 * 3]
 
 
 def test_a_telegram_of_a_protocol_with_words_holds_whole_ones(tmp_path: Path) -> None:
