@@ -222,6 +222,48 @@ def test_progress_is_the_part_of_the_log_that_was_read(tmp_path: Path) -> None:
     assert 30 * 5000 <= first < second < size
 
 
+def test_text_of_candump_is_what_python_can_reads(tmp_path: Path) -> None:
+    random, path = Random(3), tmp_path / "bus.log"
+    with can.CanutilsLogWriter(str(path)) as log:
+        for number in range(300):
+            is_fd, extended = random.random() < 0.4, random.random() < 0.4
+            size = random.choice((*range(9), *(12, 16, 20, 24, 32, 48, 64) * is_fd))
+            log(
+                can.Message(
+                    1_700_000_000 + number / 7,
+                    random.randrange(1 << (29 if extended else 11)),
+                    is_extended_id=extended,
+                    is_fd=is_fd,
+                    bitrate_switch=is_fd and random.random() < 0.5,
+                    is_error_frame=random.random() < 0.1,
+                    is_rx=random.random() < 0.5,
+                    data=random.randbytes(size),
+                )
+            )
+    numbered = list(enumerate(can.CanutilsLogReader(str(path)), start=1))
+    sent = [(number, message) for number, message in numbered if not message.is_error_frame]
+    start_s = sent[0][1].timestamp
+    frames = of_file(path.read_bytes(), tmp_path)
+    has(
+        frames,
+        [
+            (
+                (message.timestamp - start_s) * 1e6,
+                number,
+                message.arbitration_id,
+                message.is_extended_id,
+                message.dlc,
+                int.from_bytes(bytes(message.data[:8]).ljust(8, b"\0"), "big"),
+                message.is_fd,
+                message.bitrate_switch,
+                False,
+            )
+            for number, message in sent
+        ],
+    )
+    assert frames.errors == len(numbered) - len(sent)
+
+
 def test_channels_are_counted_up_to_a_bound(tmp_path: Path) -> None:
     def log(channels: int) -> str:
         return "".join(f"(1.{number:06d}) can{number} 181#00\n" for number in range(channels))
