@@ -100,6 +100,9 @@ def test_settings_are_those_of_the_nearest_file(busplan: Busplan, folder: Path, 
     assert busplan("check", "p/clean.toml", "p/warns.toml", cwd=folder).returncode == 0
     (folder / "p" / "busplan.toml").write_text('fail-on = "error"\n', encoding="utf-8")
     assert "BP110" in busplan("check", "warns.toml", cwd=folder / "p").stdout
+    # An empty file has settings, too: none.
+    (folder / "p" / "busplan.toml").write_text("", encoding="utf-8")
+    assert "BP110" in busplan("check", "warns.toml", cwd=folder / "p").stdout
 
 
 def test_the_settings_are_never_taken_for_a_profile(busplan: Busplan, folder: Path) -> None:

@@ -217,9 +217,6 @@ class _Frame(NamedTuple):
     data: bytes
 
 
-_NO_FRAME: Final = _Frame(0.0, "can", 0, False, False, False, False, False, 0, b"")
-
-
 def _candump(path: Path, file: BinaryIO) -> Iterator[_Frame]:
     """Frames of a text of `candump -l`, or of what candump writes on a terminal."""
     last: _Frame | None = None
@@ -229,13 +226,11 @@ def _candump(path: Path, file: BinaryIO) -> Iterator[_Frame]:
             # The last: `candump -e` writes in words what an error frame says.
             continue
         frame = _candump_frame(line)
-        if frame is None and "ERRORFRAME" in line:
-            frame = (last or _NO_FRAME)._replace(is_error_frame=True)
-        elif frame is None and last is None:
+        if frame is None and last is None:
             raise BusplanError(f"{path}: is not a CAN log in a known format: {_FORMATS}")
-        elif frame is None:
+        if frame is None:
             raise _DamageError(f"line {number} is not a candump line: {line[:60]!r}")
-        elif line[0] != "(":
+        if line[0] != "(":
             raise _DamageError(f"line {number} has no time; record with `candump -l`")
         last = frame
         yield frame
