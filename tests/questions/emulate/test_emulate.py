@@ -277,6 +277,35 @@ def test_a_queue_keeps_a_message_waiting(queue: str, sender: str, least: int, mo
     assert least * frame_us <= max(late_us) - min(late_us) <= (most + 0.2) * 1.2 * frame_us
 
 
+DRIVE = """\
+[cycle]
+period_us = 50000
+slice_ratio = 1
+[[group]]
+name = "drive"
+nodes = 2
+axes = 1
+read_bytes = 8
+write_bytes = 8
+queue = "fifo"
+[group.execution]
+kind = "linear"
+grade = "measured"
+base_us = 100
+per_byte_us = 0
+"""
+
+
+def test_a_node_has_a_queue_of_its_own(tmp_path: Path) -> None:
+    """The first node sends the row and what waits behind it; the queue of the bus is by priority."""
+    text = QUEUED.format("priority", 3, "drive").replace('"host"', '"drive"') + DRIVE
+    (tmp_path / "drive.toml").write_text(text)
+    content = busplan.emulate(tmp_path / "drive.toml", cycles=200).content
+    sent = [frame.us for frame in logged(content) if frame.identifier == 0x100]
+    late_us = [us - sent[0] - 10_000 * number for number, us in enumerate(sent)]
+    assert max(late_us) - min(late_us) >= 8 * 226
+
+
 def test_a_plan_that_does_not_fit_is_emulated_as_it_is(tmp_path: Path) -> None:
     slow = busplan.load_profile("can-servo-8", changes={"bus.bit_rate_kbit_s": 250})
     busplan.emulate(slow, cycles=100).save(tmp_path / "slow.log")

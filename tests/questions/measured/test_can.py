@@ -448,4 +448,9 @@ def test_emergencies_are_named_and_not_unplanned(tmp_path: Path) -> None:
         f"node-ID 32: error 0x4310, register 0x80 at {times_s[3]:.6f} s, frame {places[3]}",
     ]
     assert (found.first_frame, found.worst_frame) == (places[0], places[0])
+    # 0x685 to 0x68C are of no node by CiA 301, and so 0x89 is none of those that send them.
+    other = busplan.load_profile(PLAN, changes={"payload.feedback_identifier": 0x685})
+    sent = Logged(100_000.0, 0x89, bytes.fromhex("308111AABBCCDDEE"), False, 0)
+    told = figure(of_log(candump(sorted([*LOGGED, sent], key=lambda frame: frame.us)), tmp_path, plan=other), "emergen")
+    assert told.note.startswith("node-ID 9: error 0x8130")
     assert figure(answer, "frames of no message").note == "0x84, 0x85"
