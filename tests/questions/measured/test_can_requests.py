@@ -241,6 +241,21 @@ def test_frames_of_others_hide_a_part_of_an_answer(tmp_path: Path) -> None:
     assert answer.edits == {}
 
 
+@pytest.mark.parametrize(("read_bytes", "write_bytes"), [(8, 4), (4, 8)])
+def test_the_planned_answer_is_that_of_the_slower_of_read_and_write(
+    read_bytes: int, write_bytes: int, tmp_path: Path
+) -> None:
+    times = {"base_us": 100.0, "per_byte_us": 10.0, "worst_extra_us": 7.0}
+    changes = {"payload.read_bytes": read_bytes, "payload.write_bytes": write_bytes}
+    plan = busplan.load_profile(
+        "can-motors-8", changes=changes | {f"node.execution.{key}": us for key, us in times.items()}
+    )
+    busplan.emulate(plan, cycles=10).save(tmp_path / "motors.log")
+    answer = busplan.measured(plan, tmp_path / "motors.log")
+    (planned_us,) = (figure.planned for figure in answer.figures if figure.quantity == "request to answer")
+    assert planned_us == 100 + 8 * 10 + 7
+
+
 ANY = st.builds(
     Queued,
     st.integers(0, 60_000).map(float),
