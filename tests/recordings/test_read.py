@@ -235,11 +235,15 @@ def test_text_of_candump_is_what_python_can_reads(tmp_path: Path) -> None:
                     is_extended_id=extended,
                     is_fd=is_fd,
                     bitrate_switch=is_fd and random.random() < 0.5,
+                    error_state_indicator=is_fd and random.random() < 0.5,
                     is_error_frame=random.random() < 0.1,
                     is_rx=random.random() < 0.5,
                     data=random.randbytes(size),
                 )
             )
+    with path.open("a") as log_with_flags:
+        # The flag of 29 bits is no part of the identifier.
+        log_with_flags.write("(1700000050.000000) vcan0 80000181#0A\n")
     numbered = list(enumerate(can.CanutilsLogReader(str(path)), start=1))
     sent = [(number, message) for number, message in numbered if not message.is_error_frame]
     start_s = sent[0][1].timestamp
