@@ -125,7 +125,7 @@ def measured(
         The plan: a `Profile`, a path or a shipped name. It is not changed.
     recording
         A file of the profile's kind of bus. EtherCAT: a capture of the master's port, pcap or pcapng. CAN: a log of
-        `candump -l`, a capture of SocketCAN or, with the extra `import`, an ASC, BLF or TRC.
+        `candump -l`, a capture of SocketCAN or, with the extra `import`, ASC, BLF or TRC.
     quantile
         Quantile of the events for jitter and times, 0.5..1; 1 is the worst one recorded.
     channel

@@ -106,8 +106,8 @@ def import_profile(
     ----------
     paths
         The files, each recognised by its content: ENI, text of `ethercat slaves -v` or `ethercat pdos`, LinuxCNC's
-        ethercat-conf.xml, text of SOEM's slaveinfo, EDS, DCF; with the extra `import` DBC, KCD, SYM, ARXML, and a log
-        of the CAN bus: `candump -l`, ASC, BLF, TRC, or a capture of SocketCAN.
+        ethercat-conf.xml, text of SOEM's slaveinfo, EDS, DCF, a log of the CAN bus (`candump -l`, or a capture of
+        SocketCAN); with the extra `import` DBC, KCD, SYM, ARXML, and a log in ASC, BLF or TRC.
     name
         Name of the profile; by default that of the first file.
     bus

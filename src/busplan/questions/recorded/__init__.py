@@ -47,7 +47,7 @@ def recorded(
     Parameters
     ----------
     recording
-        A log of `candump -l`, a capture of SocketCAN or, with the extra `import`, an ASC, BLF or TRC.
+        A log of `candump -l`, a capture of SocketCAN or, with the extra `import`, ASC, BLF or TRC.
     bit_rate_kbit_s
         Bit rate of the bus [kbit/s]; None for that of frames back to back, if the log shows it.
     data_bit_rate_kbit_s
